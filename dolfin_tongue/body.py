@@ -1,0 +1,119 @@
+"""A body: points, cells, named regions, density and fibres. Plain arrays, no solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName, listing
+from dolfin_tongue.fibres import Fibres, FloatArray, IntArray
+from dolfin_tongue.shape import corner_jacobians, gauss_jacobians
+
+#: Mass density of tongue tissue, kg/m3 (as in Buchaillard et al. 2009).
+TISSUE_DENSITY = 1040.0
+
+
+@dataclass(frozen=True)
+class Body:
+    """A meshed body in its reference configuration.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3), m.
+    cells : ndarray, shape (m, 8) -- node numbers of 8-node hexahedra in the usual brick (VTK, gmsh)
+        order: 0-3 bottom counter-clockwise, 4-7 above them.
+    node_sets : named regions of nodes, each ndarray of node numbers: attachments, landmark lines.
+    landmarks : named single nodes, e.g. ``{"tip": 12}``.
+    density : mass density rho_0, kg/m3.
+    fibres : the muscles.
+    name : for messages and file names.
+
+    Raises
+    ------
+    BadMesh : wrong shapes, NaN coordinates, cells that name missing nodes, inverted cells (listed).
+    OutOfRange : density <= 0.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    landmarks: Mapping[str, int] = field(default_factory=dict)
+    density: float = TISSUE_DENSITY
+    fibres: Fibres = field(default_factory=Fibres)
+    name: str = "body"
+
+    def __post_init__(self) -> None:
+        if not self.density > 0:
+            raise OutOfRange("density", self.density, "> 0", "kg/m3")
+        self._check_arrays()
+        self._check_names()
+        inverted = np.flatnonzero(~(gauss_jacobians(self.points, self.cells).min(axis=1) > 0))
+        if inverted.size:
+            raise BadMesh(
+                f"{self.name}: {inverted.size} inverted cell(s) (Jacobian <= 0 at a quadrature "
+                f"point): {listing(inverted.tolist())}. Check the node order (0-3 bottom "
+                "counter-clockwise, 4-7 above) and the node coordinates"
+            )
+
+    def _check_arrays(self) -> None:
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            raise BadMesh(f"{self.name}: points must have shape (n, 3), not {self.points.shape}")
+        if self.cells.ndim != 2 or self.cells.shape[1] != 8 or not len(self.cells):
+            raise BadMesh(f"{self.name}: cells must have shape (m, 8), not {self.cells.shape}")
+        bad = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
+        if bad.size:
+            raise BadMesh(
+                f"{self.name}: coordinates of node(s) {listing(bad.tolist())} are not finite"
+            )
+        used = np.unique(self.cells)
+        if used[0] < 0 or used[-1] >= len(self.points):
+            raise BadMesh(
+                f"{self.name}: cells name nodes {used[0]} to {used[-1]}, but there are "
+                f"{len(self.points)} points (numbers 0 to {len(self.points) - 1})"
+            )
+        if len(used) != len(self.points):
+            unused = np.setdiff1d(np.arange(len(self.points)), used)
+            raise BadMesh(f"{self.name}: node(s) {listing(unused.tolist())} belong to no cell")
+
+    def _check_names(self) -> None:
+        for name, nodes in {**self.node_sets, **self.landmarks}.items():
+            nodes = np.atleast_1d(nodes)
+            if not nodes.size:
+                raise BadMesh(f"{self.name}: the region {name!r} is empty")
+            if nodes.min() < 0 or nodes.max() >= len(self.points):
+                raise BadMesh(f"{self.name}: the region {name!r} names a node that does not exist")
+        for muscle in self.fibres.muscles:
+            if muscle.cells.size and not 0 <= muscle.cells.min() <= muscle.cells.max() < len(
+                self.cells
+            ):
+                raise BadMesh(f"{self.name}: muscle {muscle.name!r} names a cell that is not there")
+
+    def nodes(self, region: str) -> IntArray:
+        """Node numbers of a region; UnknownName lists the known ones."""
+        if region not in self.node_sets:
+            raise UnknownName("region", region, self.node_sets)
+        return np.asarray(self.node_sets[region], dtype=np.int64)
+
+    def landmark(self, name: str) -> int:
+        """Node number of a landmark; UnknownName lists the known ones."""
+        if name not in self.landmarks:
+            raise UnknownName("landmark", name, self.landmarks)
+        return int(self.landmarks[name])
+
+    @cached_property
+    def volumes(self) -> FloatArray:
+        """Reference volume of every cell, ndarray of shape (m,), m3 (2x2x2 Gauss points, exact)."""
+        return gauss_jacobians(self.points, self.cells).sum(axis=1)
+
+    @cached_property
+    def scaled_jacobians(self) -> FloatArray:
+        """Smallest corner Jacobian of each cell over its edge lengths, shape (m,); 1 is a brick."""
+        return corner_jacobians(self.points, self.cells).min(axis=1)
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass, kg."""
+        return float(self.density * self.volumes.sum())

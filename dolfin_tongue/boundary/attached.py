@@ -1,0 +1,34 @@
+"""Attachment of nodes to bones that stand still (3.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dolfin_tongue.body import Body
+from dolfin_tongue.fibres import FloatArray, IntArray
+from dolfin_tongue.term import Support
+
+
+@dataclass(frozen=True)
+class Attached(Support):
+    """The nodes of the named regions stand still.
+
+    Parameters
+    ----------
+    regions : one or more node regions of the body; UnknownName lists the known ones.
+    """
+
+    regions: tuple[str, ...]
+
+    def __init__(self, *regions: str):
+        object.__setattr__(self, "regions", regions)
+
+    def nodes(self, body: Body) -> IntArray:
+        """Nodes of all regions, each once."""
+        return np.unique(np.concatenate([body.nodes(region) for region in self.regions]))
+
+    def displacement(self, body: Body, time: float) -> FloatArray:
+        """Zero, m."""
+        return np.zeros((len(self.nodes(body)), 3))

@@ -1,0 +1,90 @@
+"""The few errors of the package; each also derives from the built-in error that fits it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+
+class TongueError(Exception):
+    """Base of all errors that dolfin_tongue raises on purpose."""
+
+
+class UnknownName(TongueError, KeyError):
+    """A region, muscle or point name that the body does not have.
+
+    Parameters
+    ----------
+    kind : what sort of name, e.g. ``"muscle"``.
+    name : the name that was asked for.
+    available : the names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, available: Iterable[str]):
+        known = ", ".join(sorted(available)) or "(none)"
+        self.message = f"unknown {kind} {name!r}; known {kind} names: {known}"
+        super().__init__(self.message)
+
+    def __str__(self) -> str:  # KeyError would print the repr
+        return self.message
+
+
+class OutOfRange(TongueError, ValueError):
+    """A number outside the interval in which it makes sense.
+
+    Parameters
+    ----------
+    name : the quantity.
+    value : the number that was given.
+    allowed : the interval in words, e.g. ``"[0, 1]"`` or ``"> 0"``.
+    unit : SI unit, empty if dimensionless.
+    """
+
+    def __init__(self, name: str, value: Any, allowed: str, unit: str = ""):
+        unit = f" {unit}" if unit else ""
+        super().__init__(f"{name} = {value}{unit} is not allowed: it must be {allowed}{unit}")
+
+
+class BadMesh(TongueError, ValueError):
+    """A mesh or fibre field that cannot be simulated; the message lists the offenders."""
+
+
+class BadScene(TongueError, ValueError):
+    """Terms, controls or supports that contradict each other or leave a scene undetermined."""
+
+
+class NoDirectForce(TongueError, NotImplementedError):
+    """A term that the direct solver does not implement.
+
+    Parameters
+    ----------
+    term : the term object that was refused.
+    """
+
+    def __init__(self, term: object):
+        super().__init__(
+            f"the direct solver has no force for the term {type(term).__name__}; "
+            "remove it from the scene or use the FEniCSx solver"
+        )
+
+
+class NotConverged(TongueError, RuntimeError):
+    """The nonlinear solver lost convergence and could not recover by smaller steps.
+
+    Parameters
+    ----------
+    reason : PETSc's name of the reason, or the solver's own words.
+    time : time reached, s (load factor in statics).
+    detail : where (cells) and what to try.
+    """
+
+    def __init__(self, reason: str, time: float, detail: str):
+        self.reason, self.time = reason, time
+        super().__init__(f"no convergence beyond t = {time:.6g}: {reason}. {detail}")
+
+
+def listing(items: Iterable[Any], limit: int = 20) -> str:
+    """Join items for a message, cut after `limit` of them with the number left out."""
+    items = list(items)
+    text = ", ".join(str(item) for item in items[:limit])
+    return text + (f", ... ({len(items) - limit} more)" if len(items) > limit else "")

@@ -1,0 +1,77 @@
+"""A scene: a body and the terms picked for it. Frozen, checked, without any solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dolfin_tongue.body import Body
+from dolfin_tongue.errors import BadScene
+from dolfin_tongue.fibres import IntArray
+from dolfin_tongue.term import Support, Term
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A body with its physics.
+
+    Parameters
+    ----------
+    body : mesh, regions, density, fibres.
+    terms : the physics, each a frozen `Term`; only what is listed is computed.
+    supports : kinematic conditions on nodes, e.g. `Attached("base")`.
+
+    Raises
+    ------
+    UnknownName : a term or support names a muscle or region that the body does not have.
+    BadScene : something that is no term, no term at all, or two supports on one node.
+    """
+
+    body: Body
+    terms: tuple[Term, ...]
+    supports: tuple[Support, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.terms:
+            raise BadScene("a scene needs at least one term, e.g. ReportTissue()")
+        for term in self.terms:
+            if not isinstance(term, Term):
+                raise BadScene(f"{term!r} is not a term; supports go into `supports`")
+            term.check(self.body)
+        for support in self.supports:
+            if not isinstance(support, Support):
+                raise BadScene(f"{support!r} is not a support; terms go into `terms`")
+        held = [support.nodes(self.body) for support in self.supports]
+        nodes, count = np.unique(np.concatenate([*held, []]).astype(np.int64), return_counts=True)
+        if (count > 1).any():
+            raise BadScene(
+                f"node(s) {nodes[count > 1].tolist()} belong to more than one support; give each "
+                "node to one of them"
+            )
+
+    @property
+    def held_nodes(self) -> IntArray:
+        """Sorted numbers of the nodes with prescribed displacement."""
+        held = [support.nodes(self.body) for support in self.supports]
+        return np.unique(np.concatenate([*held, []]).astype(np.int64))
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times (s) at which some term is not smooth, increasing."""
+        return tuple(sorted({t for term in self.terms for t in term.breakpoints}))
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Times (s) at which some term jumps, increasing."""
+        return tuple(sorted({t for term in self.terms for t in term.jumps}))
+
+    def check_static(self) -> None:
+        """Raise BadScene if the supports leave rigid motions free (statics would be singular)."""
+        held = self.body.points[self.held_nodes]
+        if len(held) < 3 or np.linalg.matrix_rank(held - held.mean(axis=0), tol=1e-9) < 2:
+            raise BadScene(
+                f"a static problem needs attachments that hold the body: {len(held)} node(s) are "
+                "held, three that do not lie on one line are needed. Add Attached(region) to "
+                f"`supports`; regions: {', '.join(sorted(self.body.node_sets)) or '(none)'}"
+            )

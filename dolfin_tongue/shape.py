@@ -1,0 +1,72 @@
+"""Shape of trilinear hexahedra: Jacobians at Gauss points and corners, in plain NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Corners of the master element [-1, 1]^3 in the usual brick order, shape (8, 3).
+CORNERS = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1],
+     [-1, 1, 1]], dtype=float)  # fmt: skip
+
+#: Quadrilateral faces of the brick, outward by the right-hand rule, shape (6, 4).
+FACES = np.array(
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])  # fmt: skip
+
+
+def shape_gradients(xi: FloatArray) -> FloatArray:
+    """Gradients of the 8 trilinear shape functions in the master element.
+
+    Parameters
+    ----------
+    xi : ndarray, shape (q, 3), in [-1, 1] -- points of the master element.
+
+    Returns
+    -------
+    ndarray, shape (q, 8, 3).
+    """
+    factor = 1.0 + CORNERS[None] * xi[:, None]
+    gradient = np.empty((len(xi), 8, 3))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        gradient[..., i] = CORNERS[:, i] * factor[..., j] * factor[..., k] / 8.0
+    return gradient
+
+
+def _jacobians(points: FloatArray, cells: npt.NDArray, xi: FloatArray) -> FloatArray:
+    """dX/dxi in all cells at the points xi, shape (m, q, 3, 3)."""
+    return np.einsum("mki,qkj->mqij", points[cells], shape_gradients(xi))
+
+
+def gauss_jacobians(points: FloatArray, cells: npt.NDArray) -> FloatArray:
+    """Jacobian determinants times weight (1) at the 2x2x2 Gauss points.
+
+    Their sum over the points is the exact volume of the cell, since the determinant of a trilinear
+    map is at most quadratic in each coordinate.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3), m.
+    cells : ndarray, shape (m, 8).
+
+    Returns
+    -------
+    ndarray, shape (m, 8), m3.
+    """
+    return np.linalg.det(_jacobians(points, cells, CORNERS / np.sqrt(3.0)))
+
+
+def corner_jacobians(points: FloatArray, cells: npt.NDArray) -> FloatArray:
+    """Scaled Jacobians at the corners: determinant over the product of the three edge lengths.
+
+    Returns
+    -------
+    ndarray, shape (m, 8), dimensionless, 1 at a right-angled corner.
+    """
+    jacobian = _jacobians(points, cells, CORNERS)
+    edges = np.linalg.norm(jacobian, axis=2).prod(axis=2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.linalg.det(jacobian) / edges

@@ -1,0 +1,1 @@
+"""Solvers of the semi-discrete equations: statics and motion in time."""

@@ -1,0 +1,282 @@
+"""Motion in time with PETSc TS ``alpha2``, the generalised-alpha method of Chung and Hulbert 1993.
+
+The stage of the method stands at t_n + alpha_f dt. Momentum is stated there. The volume condition
+and the held nodes are stated at the end of the step, whose state follows from the stage by
+y_end = y_n + (y_stage - y_n) / alpha_f. So every accepted state keeps its volumes to the tolerance
+of Newton's method; stated at the stage, they would be lost at order dt^2 (2 % in a fast motion).
+The pressure is an unknown of the stage and has no memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from petsc4py import PETSc
+
+from dolfin_tongue.errors import NotConverged, OutOfRange
+from dolfin_tongue.fibres import FloatArray
+from dolfin_tongue.scene import Scene
+from dolfin_tongue.solve.failure import where_and_why
+from dolfin_tongue.solve.newton import SNES_OPTIONS, Newton, Tolerances, reason_name, set_options
+from dolfin_tongue.state import State
+from dolfin_tongue.system import System
+from dolfin_tongue.term import require_positive
+
+
+@dataclass(frozen=True)
+class TimeSteps:
+    """How to march in time.
+
+    Parameters
+    ----------
+    dt : step, s, > 0; with `tolerance` the first step and the unit of the limits.
+    spectral_radius : of the method at high frequencies, in [0, 1]; 1 keeps all energy and dies of
+        it, 0 damps the most. The default 0.8 damps what dt does not resolve within some steps.
+    tolerance : largest error of a nodal displacement per step, m; None keeps dt fixed.
+    largest : largest step where the step adapts, s; default 10 dt.
+    smallest : step below which a run that loses convergence is given up, s; default dt / 1000.
+    newton : tolerances of Newton's method.
+    """
+
+    dt: float = 5e-3
+    spectral_radius: float = 0.8
+    tolerance: float | None = None
+    largest: float | None = None
+    smallest: float | None = None
+    newton: Tolerances = field(default_factory=Tolerances)
+
+    def __post_init__(self) -> None:
+        require_positive(self, "s", dt=self.dt)
+        if not 0 <= self.spectral_radius <= 1:
+            raise OutOfRange("TimeSteps.spectral_radius", self.spectral_radius, "in [0, 1]")
+        if self.tolerance is not None:
+            require_positive(self, "m", tolerance=self.tolerance)
+
+    @property
+    def step_limits(self) -> tuple[float, float]:
+        """Smallest and largest step, s."""
+        return (self.smallest or self.dt / 1000, self.largest or 10 * self.dt)
+
+
+class Dynamics:
+    """Motion of a scene from an initial state.
+
+    Parameters
+    ----------
+    scene : body, terms, supports.
+    steps : step size, method, tolerances.
+    """
+
+    def __init__(self, scene: Scene, steps: TimeSteps | None = None):
+        self.system = System(scene, dynamic=True)
+        self.steps = steps or TimeSteps()
+        self.ts = self._new_ts()
+        self.newton = Newton(self.system, self.ts.getSNES(), self.steps.newton)
+        self.ts.setI2Jacobian(self._jacobian, self.newton.matrix)
+        self.ts.getSNES().setInitialGuess(self._predict)
+        self._velocity_before: FloatArray | None = None
+        self._stage_pressure_before: FloatArray | None = None
+        self._stage_pressure = np.zeros(len(scene.body.cells))
+
+    def _new_ts(self) -> PETSc.TS:
+        ts = PETSc.TS().create(PETSc.COMM_SELF)
+        ts.setType("alpha2")
+        ts.setI2Function(self._function, PETSc.Vec().createSeq(self.system.space.size))
+        ts.setMaxTime(1e300)  # the end is ours to meet; see `_march_segment`
+        ts.setMaxSteps(2**31 - 2)
+        ts.setMaxSNESFailures(-1)
+        ts.setMaxStepRejections(0)  # a failed step comes back to us; see `_advance`
+        method = {"ts_alpha_radius": self.steps.spectral_radius, "ts_adapt_type": "none"}
+        set_options(ts, method | SNES_OPTIONS)
+        return ts
+
+    # -- callbacks of PETSc --------------------------------------------------------------------
+
+    def _set_state(
+        self, ts: PETSc.TS, time: float, state: PETSc.Vec, rate: PETSc.Vec, acceleration: PETSc.Vec
+    ) -> tuple[float, float]:
+        """Hand a stage to the system; (end time of the step, fraction at which the stage stands).
+
+        While TS estimates an initial acceleration by two backward Euler steps of half size, its
+        step is that half, and the stage stands at or beyond the end: there stage and end agree.
+        """
+        dt, begin = ts.getTimeStep(), ts.getTime()
+        fraction = (time - begin) / dt
+        if fraction > 1 - 1e-9:
+            fraction, time_end, end = 1.0, time, state.array_r
+        else:
+            start = ts.getSolution().array_r
+            end = start + (state.array_r - start) / fraction
+            time_end = begin + dt
+        self.system.set_state(time, state.array_r, rate.array_r, acceleration.array_r, end)
+        return time_end, fraction
+
+    def _function(self, ts, time, state, rate, acceleration, out) -> None:
+        time_end, _ = self._set_state(ts, time, state, rate, acceleration)
+        self.newton.residuals += 1
+        self.system.residual(time_end, out.array_w)
+        self._stage_pressure = self.system.pressure(state.array_r)
+
+    def _jacobian(self, ts, time, state, rate, acceleration, shift_v, shift_a, matrix, _) -> None:
+        _, fraction = self._set_state(ts, time, state, rate, acceleration)
+        shifts = (shift_v, shift_a, 1.0 / fraction)
+        self.newton.jacobian(matrix, shifts, lambda: self.system.jacobian(matrix, shifts))
+
+    def _predict(self, snes: PETSc.SNES, guess: PETSc.Vec) -> None:
+        """Start Newton from an extrapolated displacement; TS itself would start from no motion."""
+        state, rate = self.ts.getSolution2()
+        velocity = rate.array_r
+        if self._velocity_before is not None:
+            velocity = 1.5 * velocity - 0.5 * self._velocity_before
+        dofs = self.system.space.displacement_dofs
+        guess.array_w[dofs] += self.ts.getTimeStep() * velocity[dofs]
+
+    # -- marching ------------------------------------------------------------------------------
+
+    def march(self, end: float, start: State | None = None) -> Iterator[State]:
+        """March to an end time, which is met exactly; yields every accepted state.
+
+        The first state yielded is the start itself. Steps end at each break point of the
+        activations, so that a kink or jump costs no order of accuracy.
+
+        Parameters
+        ----------
+        end : s.
+        start : state to start from; default: the reference configuration at rest at t = 0.
+
+        Raises
+        ------
+        OutOfRange : `end` not after the start.
+        NotConverged : when steps were cut to the smallest; all states before were yielded.
+        """
+        state = start or self.rest()
+        if not end > state.time:
+            raise OutOfRange("end", end, f"> {state.time:g} (the start)", "s")
+        self._set_solution(state)
+        yield state
+        jumps = self.system.scene.jumps
+        inner = [t for t in self.system.scene.breakpoints if state.time < t < end]
+        for segment_start, segment_end in pairwise([state.time, *inner, end]):
+            if segment_start in jumps:
+                self._restart()
+            for state in self._march_segment(state, segment_end):
+                yield state
+
+    def rest(self, time: float = 0.0) -> State:
+        """Return the reference configuration at rest."""
+        shape = self.system.scene.body.points.shape
+        return State(time, np.zeros(shape), np.zeros(shape), np.zeros(len(self._stage_pressure)))
+
+    def _set_solution(self, state: State) -> None:
+        solution = PETSc.Vec().createWithArray(
+            self.system.mixed(state.displacement, state.pressure).copy()
+        )
+        rate = PETSc.Vec().createWithArray(self.system.mixed(state.velocity).copy())
+        self.ts.setTime(state.time)
+        self.ts.setTimeStep(self.steps.dt)
+        self.ts.setSolution2(solution, rate)
+        self._restart()
+
+    def _restart(self) -> None:
+        """Forget accelerations and predictions: the motion has a new beginning."""
+        self.ts.restartStep()
+        self._velocity_before = self._stage_pressure_before = None
+        self.newton.renew()
+
+    def _march_segment(self, state: State, end: float) -> Iterator[State]:
+        """March from a state to the end of a smooth stretch of time."""
+        proposal = self.steps.dt
+        while state.time < end:
+            remaining = end - state.time
+            dt = remaining / max(1, int(np.ceil(remaining / proposal - 1e-6)))
+            state, error = self._advance(state, dt, end)
+            proposal = self._next_step(state.step, error)
+            yield state
+
+    def _next_step(self, taken: float, error: float | None) -> float:
+        """Next step: the nominal one, or the one that the error estimate allows."""
+        smallest, largest = self.steps.step_limits
+        if error is None or self.steps.tolerance is None:
+            return min(self.steps.dt, 4 * taken)
+        factor = 0.9 * (self.steps.tolerance / max(error, 1e-300)) ** (1 / 3)
+        return float(np.clip(taken * np.clip(factor, 0.2, 2.0), smallest, largest))
+
+    def _advance(self, state: State, dt: float, end: float) -> tuple[State, float | None]:
+        """Take one step of at most dt, cutting it where Newton fails or the error is too large."""
+        iterations = self.newton.iterations
+        begin = self._snapshot()
+        while True:
+            self.ts.setTimeStep(dt)
+            before = self.ts.getTime()
+            reason = self._try_step()
+            error = self._local_error(state, dt) if reason > 0 else None
+            if reason > 0 and not self._too_large(error, dt):
+                break
+            dt = self._cut(dt, error)
+            if dt < self.steps.step_limits[0]:
+                body = self.system.scene.body
+                raise NotConverged(
+                    reason_name(reason), state.time, where_and_why(body, state.displacement)
+                )
+            self._restore(begin, before)
+        time = end if abs(self.ts.getTime() - end) <= 1e-9 * dt else self.ts.getTime()
+        self.ts.setTime(time)
+        self._velocity_before = begin[1]
+        return self._accepted(time, dt, self.newton.iterations - iterations), error
+
+    def _try_step(self) -> int:
+        """One TS step; the reason of its last Newton solve."""
+        self.ts.setConvergedReason(PETSc.TS.ConvergedReason.ITERATING)
+        self.ts.step()
+        return self.ts.getSNES().getConvergedReason()
+
+    def _cut(self, dt: float, error: float | None) -> float:
+        """Smaller step after a failure (a quarter) or after too large an error."""
+        if error is None or self.steps.tolerance is None:
+            return dt / 4
+        return dt * max(0.2, 0.8 * (self.steps.tolerance / error) ** (1 / 3))
+
+    def _too_large(self, error: float | None, dt: float) -> bool:
+        smallest, _ = self.steps.step_limits
+        limit = self.steps.tolerance
+        return limit is not None and error is not None and error > limit and dt > smallest
+
+    def _local_error(self, state: State, dt: float) -> float | None:
+        """Error of the step, m: a third of the difference to the extrapolated velocity's path."""
+        if self.steps.tolerance is None or self._velocity_before is None:
+            return None
+        solution, _ = self.ts.getSolution2()
+        dofs = self.system.space.displacement_dofs
+        previous = self._velocity_before[dofs]
+        ratio = dt / state.step if state.step else 1.0
+        predicted = state.velocity + 0.5 * ratio * (state.velocity - previous)
+        path = state.displacement + dt * predicted
+        return float(np.abs(solution.array_r[dofs] - path).max()) / 3
+
+    def _snapshot(self) -> tuple[FloatArray, FloatArray]:
+        solution, rate = self.ts.getSolution2()
+        return solution.array_r.copy(), rate.array_r.copy()
+
+    def _restore(self, begin: tuple[FloatArray, FloatArray], time: float) -> None:
+        """Return to the begin of a step that failed."""
+        solution, rate = self.ts.getSolution2()
+        solution.array_w[:], rate.array_w[:] = begin
+        self.ts.setTime(time)
+        self._restart()
+
+    def _accepted(self, time: float, dt: float, iterations: int) -> State:
+        """State at the end of a step, with the pressure extrapolated from the stages."""
+        solution, rate = self.ts.getSolution2()
+        alpha_f = 1 / (1 + self.steps.spectral_radius)
+        pressure = self._stage_pressure
+        if self._stage_pressure_before is not None:
+            pressure = pressure + (1 - alpha_f) * (pressure - self._stage_pressure_before)
+        self._stage_pressure_before = self._stage_pressure
+        solution.array_w[self.system.space.pressure_dofs] = pressure
+        return State(
+            time, self.system.displacement(solution.array_r),
+            self.system.displacement(rate.array_r), pressure.copy(), dt, iterations,
+        )  # fmt: skip

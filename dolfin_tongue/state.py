@@ -1,0 +1,29 @@
+"""One instant of a simulation, in the body's order: what solvers give and observers take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dolfin_tongue.fibres import FloatArray
+
+
+@dataclass(frozen=True)
+class State:
+    """State of a body.
+
+    Parameters
+    ----------
+    time : s (the load factor in statics).
+    displacement : ndarray, shape (n, 3), m.
+    velocity : ndarray, shape (n, 3), m/s; zero in statics.
+    pressure : ndarray, shape (m,), Pa, positive in compression.
+    step : length of the step that led here, s; 0 for an initial state.
+    iterations : Newton iterations of that step.
+    """
+
+    time: float
+    displacement: FloatArray
+    velocity: FloatArray
+    pressure: FloatArray
+    step: float = 0.0
+    iterations: int = 0

@@ -1,0 +1,216 @@
+"""Semi-discrete equations of a scene: G(t, y, y', y'') = 0 with y = (u, p). There is no dt here.
+
+The residual is a pure function of its arguments. The rows of the volume condition and of the held
+nodes are kinematic: they are stated for the state at the *end* of a time step, so that every
+accepted state keeps its volumes, while the rows of momentum are stated at the stage of the method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from petsc4py import PETSc
+
+from dolfin_tongue.compile import compile_form
+from dolfin_tongue.constitutive.incompressible import pressure_power, volume_condition
+from dolfin_tongue.errors import BadScene
+from dolfin_tongue.fibres import FloatArray
+from dolfin_tongue.kinematics import Expr, Kinematics
+from dolfin_tongue.mesh import cell_function, mixed_space, set_cell_values
+from dolfin_tongue.scene import Scene
+
+#: 2x2x2 Gauss points on hexahedra, as in the report.
+QUADRATURE_DEGREE = 3
+
+
+class CellFields:
+    """Cell-wise coefficients of the terms (see `term.Fields`); those that vary follow the time."""
+
+    def __init__(self, space):
+        self.body = space.body
+        self._space = space
+        self._varying: list[tuple[fem.Function, Callable[[float], FloatArray]]] = []
+        self._time = np.nan
+
+    def on_cells(self, values: FloatArray) -> fem.Function:
+        """Coefficient with constant values of shape (m,) or (m, k), in the body's order."""
+        components = values.shape[1] if values.ndim > 1 else 1
+        function = cell_function(self._space.mesh, components)
+        set_cell_values(function, values, self._space.cell_order)
+        return function
+
+    def varying_on_cells(self, values: Callable[[float], FloatArray]) -> fem.Function:
+        """Coefficient whose values are evaluated at each new time."""
+        function = self.on_cells(values(0.0))
+        self._varying.append((function, values))
+        self._time = np.nan
+        return function
+
+    def set_time(self, time: float) -> None:
+        """Evaluate the varying coefficients at a time, s."""
+        if time != self._time:
+            for function, values in self._varying:
+                set_cell_values(function, values(time), self._space.cell_order)
+            self._time = time
+
+
+class System:
+    """Residual and Jacobian of a scene on the mixed space.
+
+    Parameters
+    ----------
+    scene : body, terms, supports.
+    dynamic : with inertia and rates; otherwise a static problem with a load factor, in which no
+        velocity, no acceleration and no mass exist.
+    """
+
+    def __init__(self, scene: Scene, dynamic: bool):
+        if not dynamic:
+            scene.check_static()
+        self.scene, self.dynamic = scene, dynamic
+        self.space = mixed_space(scene.body)
+        self.fields = CellFields(self.space)
+        self._build_states()
+        self.terms_in_form: list = []
+        residual = self._residual_form()
+        self.residual_form = residual
+        self.jacobian_form = self._jacobian_form(residual)
+        self._residual = compile_form(residual)
+        self._jacobian = compile_form(self.jacobian_form)
+        self._pressure_dofs = self.space.pressure_dofs
+        self._volumes = scene.body.volumes
+        held = scene.held_nodes
+        self._held_dofs = self.space.displacement_dofs[held].astype(np.int32)
+        self._held_nodes = held
+
+    # -- forms ---------------------------------------------------------------------------------
+
+    def _build_states(self) -> None:
+        """Coefficients for the states the residual depends on, and the constants of the method."""
+        grid, space = self.space.mesh, self.space.space
+        self.dx = ufl.Measure("dx", grid, metadata={"quadrature_degree": QUADRATURE_DEGREE})
+        self.state = fem.Function(space, name="state")
+        self.load = None if self.dynamic else fem.Constant(grid, 1.0)
+        self.end_state = fem.Function(space, name="end") if self.dynamic else self.state
+        self.rate = fem.Function(space, name="rate") if self.dynamic else None
+        self.acceleration = fem.Function(space, name="acceleration") if self.dynamic else None
+        self._shifts = [fem.Constant(grid, 0.0) for _ in range(3)] if self.dynamic else []
+
+    def number(self, value: float) -> fem.Constant:
+        """Return a constant of the forms: another value needs no new compilation."""
+        return fem.Constant(self.space.mesh, float(value))
+
+    def kinematics(self, state: fem.Function, rate: fem.Function | None) -> Kinematics:
+        """Kinematics of a mixed state (and its rate)."""
+        velocity = None if rate is None else ufl.split(rate)[0]
+        return Kinematics(ufl.split(state)[0], self.dx, self.number, velocity, self.load)
+
+    def _residual_form(self) -> ufl.Form:
+        """Sum of the virtual powers of all terms, inertia, pressure and volume condition."""
+        test_u, test_p = ufl.TestFunctions(self.space.space)
+        kin = self.kinematics(self.state, self.rate)
+        form = pressure_power(kin, ufl.split(self.state)[1], test_u)
+        for term in self.scene.terms:
+            part = term.virtual_power(kin, self.fields, test_u)
+            if part is not None:
+                form += part
+                self.terms_in_form.append(term)
+        if self.dynamic:
+            density = self.number(self.scene.body.density)
+            acceleration = ufl.split(self.acceleration)[0]
+            form += density * ufl.inner(acceleration, test_u) * self.dx  # (40)
+        end = self.kinematics(self.end_state, None) if self.dynamic else kin
+        return form + volume_condition(end, test_p)
+
+    def _jacobian_form(self, residual: ufl.Form) -> ufl.Form:
+        """Derivative by the state, plus shifted derivatives by those other states that occur."""
+        trial = ufl.TrialFunction(self.space.space)
+        form = ufl.derivative(residual, self.state, trial)
+        if self.dynamic:
+            others = (self.rate, self.acceleration, self.end_state)
+            present = residual.coefficients()
+            for shift, other in zip(self._shifts, others, strict=True):
+                if other in present:
+                    form += shift * ufl.derivative(residual, other, trial)
+        return form
+
+    # -- residual and Jacobian -----------------------------------------------------------------
+
+    def set_state(
+        self,
+        time: float,
+        state: FloatArray,
+        rate: FloatArray | None = None,
+        acceleration: FloatArray | None = None,
+        end_state: FloatArray | None = None,
+    ) -> None:
+        """Set the arguments (t, y, y', y'', y at the end of the step); mixed arrays."""
+        self.fields.set_time(time)
+        self.state.x.array[:] = state
+        if self.dynamic:
+            self.rate.x.array[:] = rate
+            self.acceleration.x.array[:] = acceleration
+            self.end_state.x.array[:] = end_state
+
+    def residual(self, time_end: float, out: FloatArray) -> None:
+        """Residual at the arguments that were set; N in rows of u, m3 in rows of p."""
+        out[:] = 0.0
+        fem.assemble_vector(out, self._residual)
+        if self._held_dofs.size:
+            out[self._held_dofs] = (
+                self.end_state.x.array[self._held_dofs] - self.held_displacement(time_end)
+            )
+
+    def jacobian(self, matrix: PETSc.Mat, shifts: tuple[float, float, float] = (0, 0, 0)) -> None:
+        """Jacobian at the arguments that were set: dG/dy + shifts . dG/d(y', y'', y_end)."""
+        for constant, shift in zip(self._shifts, shifts, strict=False):
+            constant.value = shift
+        matrix.zeroEntries()
+        assemble_matrix(matrix, self._jacobian)
+        matrix.assemble()
+        if self._held_dofs.size:
+            diagonal = shifts[2] if self.dynamic else 1.0
+            matrix.zeroRowsLocal(self._held_dofs.ravel(), diag=diagonal)
+
+    def new_matrix(self) -> PETSc.Mat:
+        """Empty matrix with the sparsity of the Jacobian."""
+        matrix = create_matrix(self._jacobian)
+        matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        return matrix
+
+    def held_displacement(self, time: float) -> FloatArray:
+        """Prescribed displacement of the held nodes, shape (number of them, 3), m."""
+        value = np.zeros((len(self.scene.body.points), 3))
+        for support in self.scene.supports:
+            value[support.nodes(self.scene.body)] = support.displacement(self.scene.body, time)
+        return value[self._held_nodes]
+
+    def volume_change(self, residual: FloatArray) -> FloatArray:
+        """Relative volume change of every cell from a residual vector, shape (m,)."""
+        return -residual[self._pressure_dofs] / self._volumes
+
+    # -- between mixed arrays and arrays in the body's order -----------------------------------
+
+    def displacement(self, mixed: FloatArray) -> FloatArray:
+        """Displacement (or velocity) of the nodes from a mixed array, shape (n, 3)."""
+        return mixed[self.space.displacement_dofs]
+
+    def pressure(self, mixed: FloatArray) -> FloatArray:
+        """Pressure of the cells from a mixed array, shape (m,), Pa."""
+        return mixed[self.space.pressure_dofs]
+
+    def mixed(self, displacement: FloatArray, pressure: FloatArray | float = 0.0) -> FloatArray:
+        """Mixed array from displacement, shape (n, 3), and pressure, shape (m,)."""
+        body = self.scene.body
+        if displacement.shape != body.points.shape:
+            raise BadScene(
+                f"a displacement of shape {body.points.shape} is needed, not {displacement.shape}"
+            )
+        array = np.zeros(self.space.size)
+        array[self.space.displacement_dofs] = displacement
+        array[self.space.pressure_dofs] = pressure
+        return array

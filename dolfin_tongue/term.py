@@ -1,0 +1,103 @@
+"""What a term is: a frozen piece of physics that a scene lists.
+
+A term holds numbers and names. It states its virtual power once, in UFL; the direct solver has one
+nodal force for the same class. What a scene does not list is not compiled, stored or evaluated.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+import ufl
+
+from dolfin_tongue.body import Body
+from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.fibres import FloatArray, IntArray
+from dolfin_tongue.kinematics import Expr, Kinematics
+
+
+class Fields(Protocol):
+    """What the FEniCSx side lends to a term: values on cells, constant or varying in time."""
+
+    body: Body
+
+    def on_cells(self, values: FloatArray) -> Expr:
+        """UFL coefficient that is constant in each cell; `values` of shape (m,) or (m, k)."""
+
+    def varying_on_cells(self, values: Callable[[float], FloatArray]) -> Expr:
+        """Like `on_cells`, with values that are evaluated anew at each time t, s."""
+
+
+class Term(ABC):
+    """Base of the terms that do (virtual) power."""
+
+    def check(self, body: Body) -> None:
+        """Refuse names and numbers that do not fit the body, before any solve."""
+
+    @abstractmethod
+    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form | None:
+        """State internal minus external virtual power of the test velocity, W.
+
+        Returns None where the term has no part (a rate term in a static scene).
+        """
+
+    def energy_density(self, kin: Kinematics, fields: Fields) -> Expr | None:
+        """Potential energy per reference volume, J/m3; None for a term without one."""
+        return None
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times (s) at which the term is not smooth; steps end there."""
+        return ()
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Those of the break points at which the term itself jumps."""
+        return ()
+
+
+class EnergyTerm(Term):
+    """A term that derives from an energy density; its first Piola-Kirchhoff stress is dW/dF."""
+
+    @abstractmethod
+    def energy_density(self, kin: Kinematics, fields: Fields) -> Expr:
+        """Energy per reference volume, J/m3."""
+
+    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form:
+        """Integral of dW/dF : grad w (29), (39)."""
+        return kin.power(ufl.diff(self.energy_density(kin, fields), kin.F), test)
+
+
+class Support(ABC):
+    """A kinematic condition on nodes."""
+
+    @abstractmethod
+    def nodes(self, body: Body) -> IntArray:
+        """Node numbers whose displacement is prescribed."""
+
+    @abstractmethod
+    def displacement(self, body: Body, time: float) -> FloatArray:
+        """Prescribed displacement of these nodes at a time, shape (len(nodes), 3), m."""
+
+
+def require_positive(owner: object, unit: str, **numbers: float) -> None:
+    """Raise OutOfRange unless every number is finite and > 0."""
+    for name, value in numbers.items():
+        if not (np.isfinite(value) and value > 0):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "finite and > 0", unit)
+
+
+def require_not_negative(owner: object, unit: str, **numbers: float) -> None:
+    """Raise OutOfRange unless every number is finite and >= 0."""
+    for name, value in numbers.items():
+        if not (np.isfinite(value) and value >= 0):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "finite and >= 0", unit)
+
+
+def require_vector(owner: object, name: str, value: Any) -> None:
+    """Raise OutOfRange unless the value has three finite components."""
+    if np.shape(value) != (3,) or not np.isfinite(np.asarray(value, dtype=float)).all():
+        raise OutOfRange(f"{type(owner).__name__}.{name}", value, "three finite numbers")

@@ -1,0 +1,1 @@
+"""Geometry of tongues: unit block, Bezier solid, the preliminary tongue, published meshes."""

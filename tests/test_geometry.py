@@ -1,0 +1,473 @@
+"""Unit block, Bezier solid, the preliminary and the published tongue, boxes.
+
+What carries the weight: the Jacobian (66) against finite differences (its printed sign is wrong),
+the parents of refined cells (muscles hang on them), and the largest forces of the muscles against
+the published ones.
+"""
+
+from pathlib import Path
+
+import gmsh
+import numpy as np
+import pytest
+
+from dolfin_tongue.errors import BadMesh, OutOfRange
+from dolfin_tongue.geometry.bezier import BezierSolid, bernstein
+from dolfin_tongue.geometry.block import DIVISIONS, unit_block
+from dolfin_tongue.geometry.muscles import (
+    CROSS_SECTIONS,
+    MUSCLES,
+    Part,
+    block_fibres,
+    fibre_length,
+    mesh_cross_section,
+)
+from dolfin_tongue.geometry.preliminary import (
+    default_control_points,
+    preliminary_tongue,
+)
+from dolfin_tongue.geometry.published import (
+    MAX_STRESS,
+    published_tongue,
+    read_activations,
+)
+from dolfin_tongue.geometry.simple import block_body, distort, surface_nodes
+from dolfin_tongue.shape import gauss_jacobians
+
+
+def lattice_control_points(shape: tuple[int, int, int]) -> np.ndarray:
+    """Control points at even distances: the solid is then the unit cube itself."""
+    axes = [np.linspace(0.0, 1.0, count) for count in shape]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
+@pytest.fixture
+def rst() -> np.ndarray:
+    return np.random.default_rng(3).uniform(size=(20, 3))
+
+
+@pytest.fixture(scope="module")
+def tongue():
+    return preliminary_tongue()
+
+
+# Bezier solid
+
+
+@pytest.mark.parametrize("degree", [0, 1, 5])
+def test_bernstein_is_a_partition_of_unity(degree):
+    t = np.linspace(0.0, 1.0, 11)
+    values = bernstein(degree, t)
+    assert values.shape == (11, degree + 1)
+    assert (values >= 0).all()
+    np.testing.assert_allclose(values.sum(axis=1), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(values[[0, -1]], np.eye(degree + 1)[[0, -1]])
+
+
+def test_even_control_points_give_the_identity(rst):
+    solid = BezierSolid(lattice_control_points((6, 4, 3)))
+    np.testing.assert_allclose(solid.map(rst), rst, atol=1e-14)
+    np.testing.assert_allclose(solid.jacobian(rst), np.tile(np.eye(3), (20, 1, 1)), atol=1e-13)
+
+
+def test_jacobian_agrees_with_finite_differences(rst):
+    random = np.random.default_rng(5).normal(size=(6, 4, 3, 3))
+    solid, step = BezierSolid(lattice_control_points((6, 4, 3)) + 0.1 * random), 1e-6
+    inside = 0.01 + 0.98 * rst
+    for axis in range(3):
+        shift = step * np.eye(3)[axis]
+        difference = (solid.map(inside + shift) - solid.map(inside - shift)) / (2 * step)
+        # truncation step**2 and rounding 1e-16 / step: both below 1e-9
+        np.testing.assert_allclose(solid.jacobian(inside)[:, :, axis], difference, atol=1e-8)
+
+
+def test_fibres_follow_material_lines(rst):
+    solid = BezierSolid(default_control_points())
+    inside, direction = 0.01 + 0.98 * rst, np.tile([0.3, -0.2, 0.5], (20, 1))
+    chord = solid.map(inside + 1e-6 * direction) - solid.map(inside)
+    pushed = solid.push_forward(inside, direction)
+    np.testing.assert_allclose(np.linalg.norm(pushed, axis=1), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(
+        pushed, chord / np.linalg.norm(chord, axis=1, keepdims=True), atol=1e-4
+    )
+
+
+@pytest.mark.parametrize("shape", [(6, 4, 3), (6, 4, 1, 3), (6, 4, 3, 2)])
+def test_wrong_control_points_are_refused(shape):
+    with pytest.raises(BadMesh, match="control points must have shape"):
+        BezierSolid(np.zeros(shape))
+
+
+def test_zero_direction_is_refused(rst):
+    with pytest.raises(BadMesh, match="direction in the block is zero"):
+        BezierSolid(lattice_control_points((2, 2, 2))).push_forward(rst, np.zeros((20, 3)))
+
+
+# unit block
+
+
+@pytest.mark.parametrize("refinement", [1, 2, (2, 1, 3)])
+def test_block_fills_the_unit_cube(refinement):
+    block = unit_block(refinement)
+    counts = np.multiply(DIVISIONS, refinement)
+    assert len(block.cells) == counts.prod()
+    assert len(block.rst) == (counts + 1).prod()
+    volumes = gauss_jacobians(block.rst, block.cells)
+    np.testing.assert_allclose(volumes * 8, 1.0 / counts.prod(), rtol=1e-10)
+
+
+def test_parents_are_where_their_cells_are():
+    block = unit_block((2, 3, 1))
+    np.testing.assert_array_equal(np.floor(block.centres * DIVISIONS), block.parents)
+    _, count = np.unique(block.parents, axis=0, return_counts=True)
+    assert count.tolist() == [6] * 42
+
+
+def test_regions_are_physical_groups_of_any_dimension():
+    regions = {
+        "face": [((0, 0), (0, 3), (0, 2))],
+        "edges": [((1, 2), (j, j), (2, 2)) for j in (0, 3)],
+        "corner": [((7, 7), (0, 0), (0, 0))],
+    }
+    block = unit_block(2, regions)
+    np.testing.assert_array_equal(block.regions["face"], np.flatnonzero(block.rst[:, 0] == 0))
+    assert len(block.regions["edges"]) == 2 * 3
+    assert block.regions["corner"].tolist() == [block.node_at((1, 0, 0))]
+
+
+def test_a_region_needs_one_dimension_inside_the_block():
+    for boxes in ([((0, 8), (0, 0), (0, 0))], [((0, 1),) * 3, ((0, 0),) * 3]):
+        with pytest.raises(BadMesh, match="region 'wrong'"):
+            unit_block(1, {"wrong": boxes})
+    assert not gmsh.isInitialized()
+
+
+@pytest.mark.parametrize("refinement", [0, -1, 1.5, (1, 0, 1), (1, 2)])
+def test_refinement_must_be_whole_and_positive(refinement):
+    with pytest.raises(OutOfRange, match="refinement"):
+        unit_block(refinement)
+
+
+def test_a_running_gmsh_session_is_left_alone(capfd):
+    gmsh.initialize(["-noenv"], readConfigFiles=False)
+    try:
+        gmsh.model.add("mine")
+        loud = gmsh.option.getNumber("General.Terminal")
+        unit_block(1)
+        assert gmsh.model.getCurrent() == "mine"
+        assert "unit_block" not in gmsh.model.list()
+        assert gmsh.option.getNumber("General.Terminal") == loud
+    finally:
+        gmsh.finalize()
+    unit_block(1)
+    assert not gmsh.isInitialized()
+    assert capfd.readouterr().out == ""
+
+
+# preliminary tongue
+
+
+@pytest.mark.parametrize(("refinement", "margin"), [(1, 0.3), (2, 0.25), (3, 0.2)])
+def test_jacobians_are_positive_with_a_margin(refinement, margin):
+    body = preliminary_tongue(refinement)  # Body itself refuses Jacobians <= 0 at Gauss points
+    quality = body.scaled_jacobians
+    print(f"refinement {refinement}: scaled Jacobian {quality.min():.3f} to {quality.max():.3f}")
+    assert quality.min() > margin
+
+
+@pytest.mark.parametrize("refinement", [1, 2])
+def test_size_of_the_tongue(refinement):
+    body = preliminary_tongue(refinement)
+    assert 60e-6 < body.volumes.sum() < 110e-6
+    length, width, height = np.ptp(body.points, axis=0)
+    assert 0.065 < length < 0.080
+    assert 0.040 < width < 0.070
+    assert 0.050 < height < 0.065
+    assert body.mass == pytest.approx(1040.0 * body.volumes.sum())
+
+
+def test_refinement_keeps_shape_landmarks_and_converges_in_volume(tongue):
+    fine = [preliminary_tongue(factor) for factor in (2, 4)]
+    for body in fine:
+        for name in tongue.landmarks:
+            np.testing.assert_allclose(
+                body.points[body.landmark(name)], tongue.points[tongue.landmark(name)], atol=1e-15
+            )
+        for region in tongue.node_sets:
+            offset = body.points[body.nodes(region)] - tongue.points[tongue.nodes(region)][:, None]
+            assert np.linalg.norm(offset, axis=2).min(axis=1).max() < 1e-15
+    volumes = [body.volumes.sum() for body in (tongue, *fine)]
+    # chords of a smooth surface: the error falls by 4 with each halving
+    assert (volumes[1] - volumes[0]) / (volumes[2] - volumes[1]) == pytest.approx(4.0, abs=0.5)
+    assert volumes[0] == pytest.approx(volumes[2], rel=0.10)
+
+
+def test_left_and_right_mirror_each_other(tongue):
+    mirror = np.array([1.0, -1.0, 1.0])
+    grid = tongue.points.reshape(3, 4, 8, 3)  # t, s, r
+    np.testing.assert_allclose(grid[:, ::-1], grid * mirror, atol=1e-15)
+    number = {tuple(p): c for c, p in enumerate(unit_block().parents.tolist())}
+    twin = np.array([number[i, 2 - j, k] for i, j, k in number])
+    for muscle in tongue.fibres.muscles:
+        place = {int(c): n for n, c in enumerate(muscle.cells)}
+        other = [place[int(twin[c])] for c in muscle.cells]
+        cosine = np.einsum("ca,ca->c", muscle.directions[other] * mirror, muscle.directions)
+        np.testing.assert_allclose(np.abs(cosine), 1.0, atol=1e-12)
+        np.testing.assert_allclose(muscle.density[other], muscle.density)
+
+
+def test_attachments_and_landmarks_are_where_anatomy_has_them(tongue):
+    at = {name: tongue.points[node] for name, node in tongue.landmarks.items()}
+    centre = {name: tongue.points[nodes].mean(axis=0) for name, nodes in tongue.node_sets.items()}
+    assert at["tip"][0] < at["blade"][0] < at["dorsum"][0] < at["back"][0] < at["root"][0]
+    line = tongue.points[tongue.nodes("dorsum")]
+    assert at["dorsum"][2] == line[:, 2].max()
+    assert (np.diff(line[:, 0]) < 0)[1:].all()  # ordered from root to tip
+    # the genioglossus comes from the mandible, in front and below; the free tip overhangs it
+    assert centre["genioglossus_origin"][2] < at["tip"][2] - 0.02
+    assert at["tip"][0] < centre["genioglossus_origin"][0] - 0.01 < centre["base"][0] - 0.03
+    assert centre["styloglossus_insertion"][0] > 0.115
+    assert np.abs(tongue.points[tongue.nodes("styloglossus_insertion")][:, 1]).min() > 0.015
+    fixed = [tongue.nodes(n) for n in ("base", "genioglossus_origin", "styloglossus_insertion")]
+    assert len(np.unique(np.concatenate(fixed))) == 12 + 4 + 4
+
+
+def test_contour_is_the_outline_of_the_midsagittal_sheet(tongue):
+    contour = tongue.nodes("midsagittal_contour")
+    assert len(np.unique(contour)) == len(contour) == 8 + 1 + 8
+    assert np.isin(contour, tongue.nodes("midsagittal")).all()
+    step = np.linalg.norm(np.diff(tongue.points[contour], axis=0), axis=1)
+    assert step.max() < 0.025  # it never jumps across the tongue
+    assert contour[8] == tongue.landmark("tip")
+
+
+@pytest.mark.parametrize("refinement", [1, 2])
+def test_muscles_lie_where_the_captions_say(refinement):
+    body = preliminary_tongue(refinement)
+    i, j, k = unit_block(refinement).parents.T
+    middle, high = j == 1, k == 1
+
+    def strength(name: str, where: np.ndarray) -> float:
+        """Part of a muscle's fibres, by volume times density, in some cells."""
+        muscle = body.fibres[name]
+        weight = body.volumes[muscle.cells] * muscle.density
+        return float(weight[where[muscle.cells]].sum() / weight.sum())
+
+    assert set(body.fibres.names) == set(MUSCLES) == set(CROSS_SECTIONS)
+    for name in ("styloglossus", "hyoglossus"):
+        assert strength(name, ~middle) == 1.0
+    for name in ("genioglossus_anterior", "genioglossus_posterior"):
+        assert strength(name, middle) == 1.0
+    assert strength("genioglossus_anterior", i >= 3) == 1.0
+    assert strength("genioglossus_posterior", i <= 2) == 1.0
+    assert strength("longitudinalis_inferior", ~high) == 1.0
+    assert strength("longitudinalis_inferior", ~middle) > 0.8
+    assert strength("longitudinalis_inferior", i == 0) == 0.0  # not connected to the hyoid
+    assert strength("longitudinalis_superior", high) == 1.0
+    assert strength("transversalis", high) > 0.8
+    assert strength("verticalis", ~middle) > 0.8
+    assert body.fibres.slots(body.fibres.names, len(body.cells)).count == 4
+
+
+def test_directions_of_the_fans(tongue):
+    origin = tongue.points[tongue.nodes("genioglossus_origin")].mean(axis=0)
+    centres = tongue.points[tongue.cells].mean(axis=1)
+    for name in ("genioglossus_anterior", "genioglossus_posterior"):
+        muscle = tongue.fibres[name]
+        ray = centres[muscle.cells] - origin
+        ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+        cosine = np.abs(np.einsum("ca,ca->c", ray, muscle.directions))
+        assert cosine.min() > np.cos(np.deg2rad(25.0))
+    assert np.abs(tongue.fibres["transversalis"].directions[:, 1]).min() > 0.7
+    assert (np.abs(tongue.fibres["verticalis"].directions[:, 2]) > 0.7).all()
+
+
+@pytest.mark.parametrize("refinement", [1, 3])
+@pytest.mark.parametrize(("name", "axis"), [("longitudinalis_superior", 0), ("transversalis", 1)])
+def test_largest_force_is_the_published_one(refinement, name, axis):
+    """Every cut across the fibres carries density times its area; on average the published area."""
+    block, body = unit_block(refinement), preliminary_tongue(refinement)
+    muscle = body.fibres[name]
+    along = BezierSolid(default_control_points()).jacobian(block.centres[muscle.cells])
+    step = np.linalg.norm(along[:, :, axis], axis=1) / (DIVISIONS[axis] * refinement)
+    area = muscle.density * body.volumes[muscle.cells] / step
+    layers, place = np.unique(block.centres[muscle.cells][:, axis].round(6), return_inverse=True)
+    cut = np.bincount(place, area)
+    assert len(layers) == DIVISIONS[axis] * refinement
+    # layers differ in area, and the chord of a cell from its tangent: a tenth
+    assert cut.mean() == pytest.approx(CROSS_SECTIONS[name] * 1e-6, rel=0.1)
+
+
+@pytest.mark.parametrize("refinement", [1, 3])
+def test_fibre_lengths_and_densities_are_anatomical(refinement):
+    body = preliminary_tongue(refinement)
+    for name, area in CROSS_SECTIONS.items():
+        muscle = body.fibres[name]
+        length = (muscle.density * body.volumes[muscle.cells]).sum() / (area * 1e-6)
+        assert 0.02 < length < 0.09
+        assert 0 < muscle.density.min() <= muscle.density.max() < 0.5
+
+
+def test_density_of_a_brick_muscle_in_closed_form():
+    """Fibres along a straight bar: cross-section and length are those of the bar."""
+    scale = np.array([0.07, 0.03, 0.02])
+    solid = BezierSolid(lattice_control_points((2, 2, 2)) * scale)
+    volumes = {(i, j, k): 1e-6 for i in range(7) for j in range(3) for k in range(2)}
+    steps = {(i, 1, 0): np.array([1.0, 0.0, 0.0]) for i in range(2, 6)}
+    assert fibre_length((3, 1, 0), steps, solid) == pytest.approx(0.04, rel=1e-12)
+    shares = dict.fromkeys(steps, 1.0)
+    assert mesh_cross_section(steps, shares, solid, volumes) == pytest.approx(1e-4, rel=1e-12)
+    oblique = {(i, 1, k): np.array([1.0, 0.0, 1.0]) for i in range(2, 6) for k in range(2)}
+    assert fibre_length((3, 1, 0), oblique, solid) == pytest.approx(0.02 * 2**0.5, rel=1e-12)
+
+
+def test_refined_fibres_turn_with_the_shape(tongue):
+    solid, block = BezierSolid(default_control_points()), unit_block(2)
+    fibres = block_fibres(block, solid)["longitudinalis_superior"]
+    along = solid.jacobian(block.centres[fibres.cells])[:, :, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    np.testing.assert_allclose(fibres.directions, along, atol=1e-14)
+    assert isinstance(MUSCLES["longitudinalis_superior"][0], Part)
+
+
+def test_six_control_planes_are_required():
+    with pytest.raises(BadMesh, match="six control planes"):
+        preliminary_tongue(control_points=np.zeros((5, 4, 3, 3)))
+
+
+def test_inside_out_control_points_name_the_inverted_cells():
+    with pytest.raises(BadMesh, match=r"42 inverted cell\(s\).*: 0, 1, 2"):
+        preliminary_tongue(control_points=default_control_points()[::-1])
+
+
+def test_density_of_mass_is_checked():
+    with pytest.raises(OutOfRange, match="density"):
+        preliminary_tongue(density=0.0)
+
+
+# published tongue
+
+
+def test_published_tongue(published_folder):
+    body = published_tongue(published_folder)
+    assert body.points.shape == (946, 3)
+    assert body.cells.shape == (740, 8)
+    assert body.volumes.sum() == pytest.approx(102.292e-6, rel=1e-5)
+    assert len(body.fibres.names) == 11
+    assert len(body.nodes("jaw")) == 59
+    assert len(body.nodes("hyoid")) == 56
+    assert len(body.nodes("midsagittal")) == 120
+    assert len(body.nodes("midsagittal_contour")) == 27
+    assert np.abs(body.points[body.nodes("midsagittal")][:, 1]).max() < 1e-9
+    assert body.landmark("dorsum") == body.landmark("top") == 869
+    assert (body.landmark("tip"), body.landmark("base")) == (919, 927)
+    np.testing.assert_array_equal(body.nodes("surface"), surface_nodes(body.cells))
+    for muscle in body.fibres.muscles:
+        np.testing.assert_allclose(np.linalg.norm(muscle.directions, axis=1), 1.0, rtol=1e-14)
+
+
+def test_published_forces(published_folder):
+    bundles = published_tongue(published_folder, muscles="bundles")
+    assert len(bundles.fibres.names) == 21
+    posterior = bundles.fibres["GGP_L"]
+    # largest force 18.5 N over the bundle's 166.91 mm2 in the mesh, rounded to 5 digits in the file
+    assert MAX_STRESS * posterior.density * 166.91e-6 == pytest.approx(18.5, rel=1e-4)
+    both = published_tongue(published_folder).fibres["GGP"]
+    cells = np.concatenate([bundles.fibres[f"GGP_{side}"].cells for side in "LR"])
+    np.testing.assert_array_equal(both.cells, np.unique(cells))
+    np.testing.assert_allclose(both.density, posterior.density[0])
+
+
+def test_published_tongue_says_what_is_missing(tmp_path):
+    (tmp_path / "tongue.vtu").touch()
+    with pytest.raises(FileNotFoundError, match=r"missing muscles.json, attachments.json"):
+        published_tongue(tmp_path)
+    with pytest.raises(OutOfRange, match="'groups' or 'bundles'"):
+        published_tongue(tmp_path, muscles="sides")
+
+
+def test_published_activations(published_folder):
+    names = published_tongue(published_folder).fibres.names
+    tables = sorted((published_folder / "activations").glob("bracing_*.csv"))
+    assert len(tables) == 8
+    for path in tables:
+        table = read_activations(path)
+        assert table.names == names
+        assert table.values.shape == (len(table.times), 11)
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "table.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_activation_table(tmp_path):
+    table = read_activations(write(tmp_path, "time_s,A,B\n0,0,0.5\n0.25,1,0\n"))
+    assert table.names == ("A", "B")
+    np.testing.assert_array_equal(table.times, [0, 0.25])
+    np.testing.assert_array_equal(table.values, [[0, 0.5], [1, 0]])
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "message"),
+    [
+        ("time_s,A\n0,0\n0,1\n", OutOfRange, r"time in row 1 = 0.0 .* > 0"),
+        ("time_s,A\n0,0\nnan,1\n", OutOfRange, "finite"),
+        ("time_s,A\n", OutOfRange, "at least one"),
+        ("time_s,A\n0,0\n1,1.5\n", OutOfRange, "activation of A in row 1 = 1.5"),
+        ("time_s,A\n0,nan\n", OutOfRange, "activation of A in row 0"),
+        ("time_s,A\n0,0,1\n", ValueError, "row 0 has not 2 entries"),
+        ("posture,A\na,0\n", ValueError, "must be time_s, not 'posture'"),
+        ("", ValueError, "must be time_s"),
+    ],
+)
+def test_bad_activation_tables(tmp_path, text, error, message):
+    with pytest.raises(error, match=message):
+        read_activations(write(tmp_path, text))
+
+
+def test_missing_activation_table_lists_the_others(tmp_path):
+    write(tmp_path, "time_s,A\n0,0\n")
+    with pytest.raises(FileNotFoundError, match=r"there is: table.csv"):
+        read_activations(tmp_path / "other.csv")
+
+
+# boxes
+
+
+def test_box():
+    body = block_body((0.3, 0.2, 0.1), (3, 2, 4), muscles={"along": (2, 0, 0)}, density=1000.0)
+    assert body.points.shape == (4 * 3 * 5, 3)
+    assert body.volumes.sum() == pytest.approx(0.006, rel=1e-12)
+    assert body.scaled_jacobians.min() == pytest.approx(1.0, rel=1e-12)
+    assert {name: len(nodes) for name, nodes in body.node_sets.items()} == {
+        "x0": 15, "x1": 15, "y0": 20, "y1": 20, "z0": 12, "z1": 12,
+    }  # fmt: skip
+    np.testing.assert_allclose(body.points[body.nodes("y1")][:, 1], 0.2)
+    np.testing.assert_allclose(body.points[body.landmark("end")], [0.3, 0.1, 0.05])
+    np.testing.assert_array_equal(body.fibres["along"].directions, np.tile([1.0, 0, 0], (24, 1)))
+
+
+def test_distort_moves_the_inside_only():
+    body = block_body(cells=(3, 3, 3))
+    moved = distort(body, 0.3, seed=1)
+    shift = np.abs(moved.points - body.points).max(axis=1)
+    outside = surface_nodes(body.cells)
+    assert len(outside) == 64 - 8
+    assert (shift[outside] == 0).all()
+    assert (np.delete(shift, outside) > 0).all()
+    assert shift.max() <= 0.3 * 0.01 / 3
+    assert moved.volumes.sum() == pytest.approx(body.volumes.sum(), rel=1e-12)
+    np.testing.assert_array_equal(distort(body, 0.3, seed=1).points, moved.points)
+
+
+def test_bad_boxes():
+    with pytest.raises(OutOfRange, match="size"):
+        block_body(size=(1.0, 0.0, 1.0))
+    with pytest.raises(OutOfRange, match="cells"):
+        block_body(cells=(1, 0, 1))
+    with pytest.raises(BadMesh, match="'m'"):
+        block_body(muscles={"m": (0, 0, 0)})
+    with pytest.raises(OutOfRange, match="amplitude"):
+        distort(block_body(), 0.5)
