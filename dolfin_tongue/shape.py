@@ -59,6 +59,14 @@ def gauss_jacobians(points: FloatArray, cells: npt.NDArray) -> FloatArray:
     return np.linalg.det(_jacobians(points, cells, CORNERS / np.sqrt(3.0)))
 
 
+def volume_ratios(points: FloatArray, displacement: FloatArray, cells: npt.NDArray) -> FloatArray:
+    """Det F at the 2x2x2 Gauss points of all cells, shape (m, 8).
+
+    A cell keeps its mean volume; what it leaves free inside shows what the mesh is worth.
+    """
+    return gauss_jacobians(points + displacement, cells) / gauss_jacobians(points, cells)
+
+
 def corner_jacobians(points: FloatArray, cells: npt.NDArray) -> FloatArray:
     """Scaled Jacobians at the corners: determinant over the product of the three edge lengths.
 

@@ -83,9 +83,10 @@ class System:
         self._jacobian = compile_form(self.jacobian_form)
         self._pressure_dofs = self.space.pressure_dofs
         self._volumes = scene.body.volumes
-        held = scene.held_nodes
-        self._held_dofs = self.space.displacement_dofs[held].astype(np.int32)
-        self._held_nodes = held
+        held = [support.nodes(scene.body) for support in scene.supports]
+        nodes = np.concatenate([*held, []]).astype(np.int64)
+        self._held_dofs = self.space.displacement_dofs[nodes].astype(np.int32)
+        self._held_points = [scene.body.points[part] for part in held]
 
     # -- forms ---------------------------------------------------------------------------------
 
@@ -184,10 +185,8 @@ class System:
 
     def held_displacement(self, time: float) -> FloatArray:
         """Prescribed displacement of the held nodes, shape (number of them, 3), m."""
-        value = np.zeros((len(self.scene.body.points), 3))
-        for support in self.scene.supports:
-            value[support.nodes(self.scene.body)] = support.displacement(self.scene.body, time)
-        return value[self._held_nodes]
+        supports = zip(self.scene.supports, self._held_points, strict=True)
+        return np.concatenate([support.displacement(x, time) for support, x in supports])
 
     def volume_change(self, residual: FloatArray) -> FloatArray:
         """Relative volume change of every cell from a residual vector, shape (m,)."""

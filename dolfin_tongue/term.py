@@ -79,8 +79,18 @@ class Support(ABC):
         """Node numbers whose displacement is prescribed."""
 
     @abstractmethod
-    def displacement(self, body: Body, time: float) -> FloatArray:
-        """Prescribed displacement of these nodes at a time, shape (len(nodes), 3), m."""
+    def displacement(self, points: FloatArray, time: float) -> FloatArray:
+        """Prescribed displacement of the nodes at a time.
+
+        Parameters
+        ----------
+        points : ndarray, shape (k, 3), m -- reference positions of the nodes, as `nodes` lists them.
+        time : s.
+
+        Returns
+        -------
+        ndarray, shape (k, 3), m.
+        """
 
 
 def require_positive(owner: object, unit: str, **numbers: float) -> None:

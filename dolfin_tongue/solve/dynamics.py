@@ -89,6 +89,7 @@ class Dynamics:
         ts.setMaxSteps(2**31 - 2)
         ts.setMaxSNESFailures(-1)
         ts.setMaxStepRejections(0)  # a failed step comes back to us; see `_advance`
+        ts.setErrorIfStepFails(False)
         method = {"ts_alpha_radius": self.steps.spectral_radius, "ts_adapt_type": "none"}
         set_options(ts, method | SNES_OPTIONS)
         return ts
@@ -121,9 +122,11 @@ class Dynamics:
         self._stage_pressure = self.system.pressure(state.array_r)
 
     def _jacobian(self, ts, time, state, rate, acceleration, shift_v, shift_a, matrix, _) -> None:
-        _, fraction = self._set_state(ts, time, state, rate, acceleration)
-        shifts = (shift_v, shift_a, 1.0 / fraction)
-        self.newton.jacobian(matrix, shifts, lambda: self.system.jacobian(matrix, shifts))
+        def assemble() -> None:
+            _, fraction = self._set_state(ts, time, state, rate, acceleration)
+            self.system.jacobian(matrix, (shift_v, shift_a, 1.0 / fraction))
+
+        self.newton.jacobian(matrix, (shift_v, shift_a), assemble)
 
     def _predict(self, snes: PETSc.SNES, guess: PETSc.Vec) -> None:
         """Start Newton from an extrapolated displacement; TS itself would start from no motion."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import isclose
 
 import numpy as np
 from petsc4py import PETSc
@@ -62,8 +63,8 @@ class Tolerances:
         before; 0 renews it in every iteration (full Newton).
     """
 
-    displacement: float = 1e-9
-    volume: float = 1e-10
+    displacement: float = 1e-8
+    volume: float = 1e-9
     iterations: int = 40
     renew_above: float = 0.25
 
@@ -72,6 +73,12 @@ class Tolerances:
         require_positive(self, "", volume=self.volume, iterations=self.iterations)
         if not 0 <= self.renew_above < 1:
             raise OutOfRange("Tolerances.renew_above", self.renew_above, "in [0, 1)")
+
+
+def _same(first: tuple[float, ...], second: tuple[float, ...]) -> bool:
+    """Whether two keys agree to a millionth."""
+    pairs = zip(first, second, strict=False)
+    return len(first) == len(second) and all(isclose(a, b, rel_tol=1e-6) for a, b in pairs)
 
 
 class Newton:
@@ -110,7 +117,7 @@ class Newton:
             change of a millionth renews it.
         assemble : fills the matrix.
         """
-        if self._stale or not np.allclose(key, self._key, rtol=1e-6, atol=0.0):
+        if self._stale or not _same(key, self._key):
             assemble()
             self.factorisations += 1
             self._stale, self._key = self.tolerances.renew_above == 0, key

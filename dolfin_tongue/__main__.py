@@ -1,0 +1,5 @@
+"""``python3 -m dolfin_tongue``."""
+
+from dolfin_tongue.cli import run
+
+run()

@@ -1,0 +1,67 @@
+"""Command line: ``python3 -m dolfin_tongue demo|bench ...``."""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from dolfin_tongue import demo as demos
+from dolfin_tongue.errors import TongueError
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.callback()
+def _root() -> None:
+    """Simulate a muscle-activated tongue."""
+
+
+@app.command()
+def demo(
+    name: Annotated[str, typer.Argument(help="which demo; see --list")] = "tongue",
+    show_list: Annotated[bool, typer.Option("--list", help="list the demos and stop")] = False,
+    results: Annotated[Path, typer.Option(help="folder of all results")] = Path("results"),
+    data: Annotated[
+        Path | None, typer.Option(envvar="DOLFIN_TONGUE_DATA", help="folder of a published tongue")
+    ] = None,
+    dt: Annotated[float | None, typer.Option(help="time step, s; default: the demo's own")] = None,
+    refinement: Annotated[int, typer.Option(help="elements per edge of each of the 42")] = 1,
+    pictures: Annotated[bool, typer.Option(help="draw pictures")] = True,
+    resume: Annotated[bool, typer.Option("--resume", help="continue a run that stopped")] = False,
+) -> None:
+    """Run a demo; its files are in RESULTS/NAME."""
+    if show_list:
+        _print_table("demos", demos.available())
+        return
+    main = demos.load(name)
+    begin = clock.perf_counter()
+    folder = results / name
+    numbers = main(demos.Options(folder, data, dt, refinement, pictures, resume))
+    _print_table(f"demo {name}", numbers)
+    Console().print(f"{clock.perf_counter() - begin:.1f} s in all; results in {folder}/")
+
+
+def _print_table(title: str, rows: dict) -> None:
+    table = Table(title=title, show_header=False)
+    for name, value in rows.items():
+        table.add_row(str(name), f"{value:.4g}" if isinstance(value, float) else str(value))
+    Console().print(table)
+
+
+def run() -> None:
+    """Run the command line; errors of the package end it with one clear line, not a traceback."""
+    try:
+        app()
+    except TongueError as error:
+        Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, style="red")
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,177 @@
+"""What is observed of a motion: volumes, energies, works and their balance, landmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, nextafter
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from dolfin_tongue.body import Body
+from dolfin_tongue.compile import compile_form
+from dolfin_tongue.fibres import FloatArray
+from dolfin_tongue.shape import gauss_jacobians
+from dolfin_tongue.state import State
+from dolfin_tongue.system import System
+from dolfin_tongue.term import Term
+
+
+def volume_changes(body: Body, displacement: FloatArray) -> FloatArray:
+    """Relative volume change of every cell, shape (m,), from the node positions alone."""
+    return gauss_jacobians(body.points + displacement, body.cells).sum(axis=1) / body.volumes - 1
+
+
+def landmark_positions(body: Body, state: State) -> dict[str, FloatArray]:
+    """Position of each landmark, shape (3,), m."""
+    return {
+        name: body.points[node] + state.displacement[node] for name, node in body.landmarks.items()
+    }
+
+
+class EnergyAudit:
+    """Energies, works and their balance over a motion.
+
+    The energies (kinetic, and one per term that has an energy density) are evaluated at accepted
+    states. The works are time integrals of the power that each other term gives to the motion:
+    positive work was done *on* the body. They are integrated by Simpson's rule, with the cubic
+    Hermite path of displacement and velocity in between, so that their own error (order 4) does not
+    hide that of time stepping. A sudden activation has one power before and another after the jump;
+    both are evaluated. The balance error
+
+        (kinetic + potential energies) - (their start) - (works)
+
+    is what time stepping loses; it falls with dt^2.
+
+    Parameters
+    ----------
+    system : a dynamic system.
+    """
+
+    def __init__(self, system: System):
+        self._system = system
+        terms = system.terms_in_form
+        self._jumps = set(system.scene.jumps)
+        kin = system.kinematics(system.state, system.rate)
+        velocity = kin.velocity
+        density = system.number(system.scene.body.density)
+        parts = {"kinetic": density / 2 * ufl.inner(velocity, velocity)}
+        names = _labels(terms)
+        for term, name in zip(terms, names, strict=True):
+            energy = term.energy_density(kin, system.fields)
+            if energy is not None:
+                parts[name] = energy
+        self.energy_names = tuple(parts)
+        self._energies = self._cell_integrals([value * system.dx for value in parts.values()])
+        powers = {
+            name: term.virtual_power(kin, system.fields, velocity)
+            for term, name in zip(terms, names, strict=True)
+            if name not in parts
+        }
+        self.work_names = tuple(powers)
+        self._powers = self._cell_integrals(list(powers.values()))
+        self.works = dict.fromkeys(self.work_names, 0.0)
+        self.exchanged = 0.0
+        self._start: float | None = None
+        self._before: State | None = None
+        self._power_before = np.zeros(len(powers))
+
+    def _cell_integrals(self, forms: Sequence[ufl.Form]) -> fem.Form | None:
+        """All integrals at once, each into its own component of a cell-wise test function."""
+        if not forms:
+            return None
+        count = len(forms)
+        element = basix.ufl.element("DG", "hexahedron", 0, shape=(max(2, count),))
+        test = ufl.TestFunction(fem.functionspace(self._system.space.mesh, element))
+        total = ufl.Form([])
+        for i, form in enumerate(forms):
+            for integral in form.integrals():
+                total += ufl.Form([integral.reconstruct(integrand=integral.integrand() * test[i])])
+        return compile_form(total)
+
+    def _evaluate(self, form: fem.Form | None, count: int) -> FloatArray:
+        if form is None:
+            return np.zeros(0)
+        cells = len(self._system.scene.body.cells)
+        vector = np.zeros(cells * max(2, count))
+        fem.assemble_vector(vector, form)
+        return vector.reshape(cells, -1).sum(axis=0)[:count]
+
+    def _set(self, state: State, time: float) -> None:
+        mixed = self._system.mixed(state.displacement)
+        rate = self._system.mixed(state.velocity)
+        self._system.set_state(time, mixed, rate, np.zeros_like(rate), mixed)
+
+    def powers(self, state: State, time: float) -> FloatArray:
+        """Power that each rate term adds to the body (W), in the order of `work_names`."""
+        self._set(state, time)
+        return -self._evaluate(self._powers, len(self.work_names))
+
+    def update(self, state: State) -> dict[str, float]:
+        """Account for a newly accepted state.
+
+        Returns
+        -------
+        dict -- energies and works so far, and the balance error, J.
+        """
+        jump = state.time in self._jumps
+        power = self.powers(state, nextafter(state.time, -inf) if jump else state.time)
+        if self._before is not None:
+            middle = hermite_middle(self._before, state)
+            power_middle = self.powers(middle, middle.time)
+            work = state.step / 6 * (self._power_before + 4 * power_middle + power)
+            self.exchanged += float(np.abs(work).sum())
+            for name, value in zip(self.work_names, work, strict=True):
+                self.works[name] += float(value)
+        self._power_before = self.powers(state, state.time) if jump else power
+        self._before = state
+        self._set(state, state.time)
+        energies = self._evaluate(self._energies, len(self.energy_names))
+        total = float(energies.sum())
+        if self._start is None:
+            self._start = total
+        balance = total - self._start - sum(self.works.values())
+        record = {f"{name}_J": float(v) for name, v in zip(self.energy_names, energies, strict=True)}
+        record |= {f"work_{name}_J": value for name, value in self.works.items()}
+        return record | {"balance_J": balance, "exchanged_J": self.exchanged}
+
+    def memory(self) -> dict[str, float | list[float]]:
+        """Return what has to be kept to continue the account in a resumed run."""
+        return {
+            "start": float(self._start or 0.0),
+            "exchanged": self.exchanged,
+            "works": list(self.works.values()),
+        }
+
+    def restore(self, memory: dict[str, float | list[float]], state: State) -> None:
+        """Continue the account of an earlier run at its last state."""
+        self._start, self.exchanged = memory["start"], memory["exchanged"]
+        self.works = dict(zip(self.work_names, memory["works"], strict=True))
+        self._before = state
+        self._power_before = self.powers(state, state.time)
+
+
+def hermite_middle(first: State, second: State) -> State:
+    """State in the middle of a step, on the cubic path through both ends and their velocities."""
+    dt = second.time - first.time
+    moved = second.displacement - first.displacement
+    return State(
+        time=first.time + dt / 2,
+        displacement=first.displacement + moved / 2 + dt / 8 * (first.velocity - second.velocity),
+        velocity=1.5 * moved / dt - (first.velocity + second.velocity) / 4,
+        pressure=(first.pressure + second.pressure) / 2,
+        step=dt / 2,
+    )
+
+
+def _labels(terms: Sequence[Term]) -> list[str]:
+    """Class names of the terms in small letters, numbered where one occurs twice."""
+    names = [type(term).__name__ for term in terms]
+    labels = []
+    for i, name in enumerate(names):
+        suffix = f"_{names[: i + 1].count(name)}" if names.count(name) > 1 else ""
+        words = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
+        labels.append(words + suffix)
+    return labels

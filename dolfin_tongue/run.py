@@ -1,0 +1,180 @@
+"""Run a scene in time, observed and recorded."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dolfin_tongue.errors import NotConverged
+from dolfin_tongue.observe import EnergyAudit, volume_changes
+from dolfin_tongue.output import Recorder
+from dolfin_tongue.scene import Scene
+from dolfin_tongue.shape import volume_ratios
+from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+from dolfin_tongue.state import State
+
+#: Wall time between checkpoints, s.
+CHECKPOINT_INTERVAL = 2.0
+
+
+@dataclass
+class Run:
+    """A finished (or stopped) run.
+
+    Parameters
+    ----------
+    scene : what was simulated.
+    folder : where its files are.
+    frames : states at the frame times.
+    last : last accepted state.
+    summary : what ``summary.json`` holds.
+    """
+
+    scene: Scene
+    folder: Path
+    frames: list[State]
+    last: State
+    summary: dict[str, Any] = field(default_factory=dict)
+
+
+def simulate(
+    scene: Scene,
+    end: float,
+    folder: Path,
+    steps: TimeSteps | None = None,
+    *,
+    frame_interval: float = 0.02,
+    resume: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """March a scene to an end time and leave its files in a folder.
+
+    Parameters
+    ----------
+    scene : body, terms, supports.
+    end : s.
+    folder : for the files; see `output.Recorder`.
+    steps : step size and method.
+    frame_interval : time between frames, s.
+    resume : continue the run that is in the folder, where there is one.
+    progress : called with the time reached (s) after every step.
+
+    Raises
+    ------
+    NotConverged : after everything up to the last accepted state was written.
+    """
+    set_up = clock.perf_counter()
+    dynamics = Dynamics(scene, steps)
+    audit = EnergyAudit(dynamics.system)
+    recorder = Recorder(folder, scene, frame_interval)
+    watch = _Watch()
+    start = _resumed(recorder, audit, watch) if resume else None
+    watch.set_up = clock.perf_counter() - set_up
+    status, last = "finished", start
+    try:
+        if start is None or start.time < end:
+            for state in dynamics.march(end, start):
+                last = state
+                if state is not start:
+                    watch.observed(lambda s=state: _observe(s, audit, recorder, watch))
+                if progress:
+                    progress(state.time)
+    except (NotConverged, KeyboardInterrupt) as error:
+        status = f"stopped: {error or type(error).__name__}"
+        raise
+    finally:
+        if last is not None:
+            recorder.checkpoint(last, _memory(audit, watch))
+            summary = _summary(scene, dynamics, audit, watch, last, status)
+            recorder.summary(summary)
+        recorder.close()
+    return Run(scene, folder, recorder.frames.read_all(), last, summary)
+
+
+@dataclass
+class _Watch:
+    """Wall times, and the largest volume changes seen."""
+
+    set_up: float = 0.0
+    start: float = 0.0
+    begin: float = field(default_factory=clock.perf_counter)
+    observing: float = 0.0
+    last_checkpoint: float = field(default_factory=clock.perf_counter)
+    volume: float = 0.0
+    local_volume: float = 0.0
+    balance: float = 0.0
+
+    def observed(self, action: Callable[[], None]) -> None:
+        """Run an action and count its time as observation."""
+        before = clock.perf_counter()
+        action()
+        self.observing += clock.perf_counter() - before
+
+
+def _memory(audit: EnergyAudit, watch: _Watch) -> dict[str, Any]:
+    """Return what a resumed run must know besides the state."""
+    extremes = [watch.volume, watch.local_volume, watch.balance]
+    return {"audit": audit.memory(), "extremes": extremes}
+
+
+def _resumed(recorder: Recorder, audit: EnergyAudit, watch: _Watch) -> State | None:
+    found = recorder.resume()
+    if found is None:
+        return None
+    state, memory = found
+    audit.restore(memory["audit"], state)
+    watch.volume, watch.local_volume, watch.balance = memory["extremes"]
+    watch.start = state.time
+    return state
+
+
+def _observe(state: State, audit: EnergyAudit, recorder: Recorder, watch: _Watch) -> None:
+    """Observe a new state, record it, and write a checkpoint where one is due."""
+    body = recorder.scene.body
+    volume = float(np.abs(volume_changes(body, state.displacement)).max())
+    local = np.abs(volume_ratios(body.points, state.displacement, body.cells) - 1).max()
+    energies = audit.update(state)
+    volumes = {"max_volume_change": volume, "max_local_volume_change": float(local)}
+    recorder.record(state, volumes | energies)
+    watch.volume = max(watch.volume, volume)
+    watch.local_volume = max(watch.local_volume, float(local))
+    watch.balance = max(watch.balance, abs(energies["balance_J"]))
+    if clock.perf_counter() - watch.last_checkpoint > CHECKPOINT_INTERVAL:
+        recorder.checkpoint(state, _memory(audit, watch))
+        watch.last_checkpoint = clock.perf_counter()
+
+
+def _summary(
+    scene: Scene, dynamics: Dynamics, audit: EnergyAudit, watch: _Watch, last: State, status: str
+) -> dict[str, Any]:
+    wall = clock.perf_counter() - watch.begin
+    solving = wall - watch.observing
+    newton = dynamics.newton
+    simulated = last.time - watch.start
+    return {
+        "status": status,
+        "time_reached_s": last.time,
+        "cells": len(scene.body.cells),
+        "unknowns": dynamics.system.space.size,
+        "muscles": list(scene.body.fibres.names),
+        "terms": [type(term).__name__ for term in scene.terms],
+        "dt_s": dynamics.steps.dt,
+        "spectral_radius": dynamics.steps.spectral_radius,
+        "set_up_wall_s": watch.set_up,
+        "solving_wall_s": solving,
+        "observing_wall_s": watch.observing,
+        "simulated_seconds_per_wall_second": simulated / solving if solving > 0 else None,
+        "newton_iterations": newton.iterations,
+        "residuals": newton.residuals,
+        "factorisations": newton.factorisations,
+        "max_volume_change": watch.volume,
+        "max_local_volume_change": watch.local_volume,
+        "max_balance_error_J": watch.balance,
+        "exchanged_energy_J": audit.exchanged,
+        "balance_error_per_exchanged": watch.balance / audit.exchanged if audit.exchanged else 0.0,
+    }
