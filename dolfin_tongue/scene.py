@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dolfin_tongue.body import Body
-from dolfin_tongue.errors import BadScene
+from dolfin_tongue.errors import BadScene, listing
 from dolfin_tongue.fibres import IntArray
 from dolfin_tongue.term import Support, Term
 
@@ -65,6 +65,16 @@ class Scene:
     def jumps(self) -> tuple[float, ...]:
         """Times (s) at which some term jumps, increasing."""
         return tuple(sorted({t for term in self.terms for t in term.jumps}))
+
+    def check_volumes(self) -> None:
+        """Raise BadScene for cells without a free node: their pressure would be undetermined."""
+        free = ~np.isin(self.body.cells, self.held_nodes)
+        stuck = np.flatnonzero(~free.any(axis=1))
+        if stuck.size:
+            raise BadScene(
+                f"all nodes of cell(s) {listing(stuck.tolist())} are held, so that nothing "
+                "determines their pressure; hold fewer nodes or leave these cells out of the body"
+            )
 
     def check_static(self) -> None:
         """Raise BadScene if the supports leave rigid motions free (statics would be singular)."""

@@ -69,6 +69,7 @@ class System:
     """
 
     def __init__(self, scene: Scene, dynamic: bool):
+        scene.check_volumes()
         if not dynamic:
             scene.check_static()
         self.scene, self.dynamic = scene, dynamic

@@ -1,0 +1,210 @@
+"""Motion in time: order, volumes, balance, break points, failures, resuming."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dolfin_tongue.boundary import Attached, Gravity
+from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
+from dolfin_tongue.control import Ramp, SmoothRamp, Step
+from dolfin_tongue.errors import BadScene, NotConverged, OutOfRange
+from dolfin_tongue.geometry.simple import block_body
+from dolfin_tongue.observe import EnergyAudit, volume_changes
+from dolfin_tongue.run import simulate
+from dolfin_tongue.scene import Scene
+from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+from dolfin_tongue.solve.newton import Tolerances
+from dolfin_tongue.solve.statics import Statics
+
+TIGHT = Tolerances(1e-12, 1e-12)
+BODY = block_body((0.04, 0.02, 0.02), (3, 2, 2), muscles={"along": (1.0, 0.0, 0.3)})
+
+
+def muscle_scene(control, *more, eta=40.0):
+    muscles = ActiveMuscles({"along": control}, 15e3)
+    return Scene(BODY, (ReportTissue(), Viscosity(eta), muscles, *more), (Attached("x0"),))
+
+
+def history(scene, steps, end):
+    states = list(Dynamics(scene, steps).march(end))
+    times = np.array([state.time for state in states])
+    return times, {
+        name: np.array([getattr(state, name) for state in states])
+        for name in ("displacement", "velocity", "pressure")
+    }
+
+
+def test_order_two_in_displacement_and_velocity():
+    """A smooth load: errors fall by 4 when dt is halved; the pressure's by more than 3."""
+    scene = muscle_scene(SmoothRamp(0.5, 0.0, 0.08))
+    end, fine = 0.08, 1.25e-4
+    _, reference = history(scene, TimeSteps(fine, newton=TIGHT), end)
+    errors = {name: [] for name in reference}
+    for ratio in (32, 16, 8):
+        _, coarse = history(scene, TimeSteps(ratio * fine, newton=TIGHT), end)
+        for name, values in coarse.items():
+            difference = np.abs(values - reference[name][::ratio]).reshape(len(values), -1)
+            errors[name].append(difference.max() / np.abs(reference[name]).max())
+    for name, least in (("displacement", 3.6), ("velocity", 3.4), ("pressure", 2.6)):
+        ratios = np.array(errors[name][:-1]) / np.array(errors[name][1:])
+        assert (ratios >= least).all(), (name, errors[name])
+    assert errors["displacement"][-1] < 1e-3
+
+
+def test_energy_balance_closes_with_order_two():
+    """Balance error over exchanged energy: below 1e-3 at 1.25 ms, a quarter at half the step."""
+    scene = muscle_scene(SmoothRamp(0.5, 0.01, 0.08), Gravity())
+    errors = []
+    for dt in (5e-3, 2.5e-3, 1.25e-3):
+        dynamics = Dynamics(scene, TimeSteps(dt))
+        audit = EnergyAudit(dynamics.system)
+        records = [audit.update(state) for state in dynamics.march(0.15)]
+        errors.append(max(abs(r["balance_J"]) for r in records) / records[-1]["exchanged_J"])
+    assert errors[-1] <= 1e-3
+    assert errors[0] / errors[1] > 3 and errors[1] / errors[2] > 3
+
+
+def test_free_fall_is_exact_and_keeps_momentum():
+    """Nothing holds the body: it falls as a point does, without strain or pressure."""
+    scene = Scene(BODY, (ReportTissue(), Gravity((0.0, 3.0, -9.81))))
+    dynamics = Dynamics(scene, TimeSteps(0.01, newton=TIGHT))
+    *_, last = dynamics.march(0.1)
+    expected = np.array([0.0, 3.0, -9.81]) * 0.1**2 / 2
+    assert last.displacement == pytest.approx(np.tile(expected, (len(BODY.points), 1)), abs=1e-9)
+    assert np.abs(last.pressure).max() < 1e-3
+
+
+def test_volumes_are_kept_at_every_accepted_state():
+    scene = muscle_scene(Step(0.6, 0.02), Gravity())
+    for radius in (0.0, 0.5, 0.8, 1.0):
+        steps = TimeSteps(5e-3, spectral_radius=radius)
+        for state in Dynamics(scene, steps).march(0.1):
+            assert np.abs(volume_changes(BODY, state.displacement)).max() <= 1e-8
+
+
+def test_hydrostatic_pressure_of_a_filled_cup():
+    """Tissue held by bottom and walls of a cup hardly moves: p = rho g (h - z), positive."""
+    cup = block_body((0.02, 0.02, 0.04), (4, 4, 8))
+    distance = np.abs(cup.points[:, :2] - 0.01).max(axis=1)
+    wall = np.flatnonzero((distance > 0.0099) | (cup.points[:, 2] < 1e-9))
+    scene = Scene(replace(cup, node_sets={"cup": wall}), (ReportTissue(a0=5e4), Gravity()),
+                  (Attached("cup"),))  # fmt: skip
+    state = Statics(scene).solve()
+    layers = state.pressure.reshape(8, 16).mean(axis=1)  # numbering: x fastest, z slowest
+    depth = 0.04 - cup.points[cup.cells].mean(axis=1)[:, 2].reshape(8, 16).mean(axis=1)
+    assert (np.diff(depth) < 0).all()
+    assert layers == pytest.approx(cup.density * 9.81 * depth, rel=0.03)
+
+
+def test_cells_that_are_held_altogether_are_refused():
+    scene = Scene(BODY, (ReportTissue(),), (Attached("x0", "y0", "y1", "x1"),))
+    assert Dynamics(scene)  # two cells wide: no cell is held altogether
+    slab = block_body((0.04, 0.02, 0.01), (3, 1, 1))
+    with pytest.raises(BadScene, match=r"all nodes of cell\(s\) 0, 1, 2"):
+        Dynamics(Scene(slab, (ReportTissue(),), (Attached("y0", "y1"),)))
+
+
+def test_motion_comes_to_rest_at_the_static_equilibrium():
+    scene = muscle_scene(SmoothRamp(0.3, 0.0, 0.05), Gravity(), eta=150.0)
+    *_, last = Dynamics(scene, TimeSteps(0.01, newton=TIGHT)).march(3.0)
+    rest = Statics(scene, replace(TIGHT, renew_above=0.0)).solve()
+    scale = np.abs(rest.displacement).max()
+    assert np.abs(last.velocity).max() < 1e-7
+    assert np.abs(last.displacement - rest.displacement).max() < 1e-7 * scale
+    assert np.abs(last.pressure - rest.pressure).max() < 1e-5 * np.abs(rest.pressure).max()
+
+
+def test_steps_end_at_break_points_and_at_the_end():
+    scene = muscle_scene(Ramp(0.3, 0.0123, 0.02))
+    times = [state.time for state in Dynamics(scene, TimeSteps(5e-3)).march(0.05)]
+    assert 0.0123 in times and times[-1] == 0.05
+    assert min(abs(t - 0.0323) for t in times) < 1e-15
+    assert (np.diff(times) <= 5e-3 * (1 + 1e-12)).all() and (np.diff(times) > 1e-4).all()
+
+
+def test_lagged_and_full_newton_agree():
+    scene = muscle_scene(Step(0.6, 0.01), Gravity())
+    runs = []
+    for renew in (0.25, 0.0):
+        dynamics = Dynamics(scene, TimeSteps(5e-3, newton=Tolerances(1e-11, renew_above=renew)))
+        *_, last = dynamics.march(0.06)
+        runs.append((last.displacement, dynamics.newton.factorisations))
+    (lagged, few), (full, many) = runs
+    assert np.abs(lagged - full).max() < 1e-9
+    assert few < many / 2
+
+
+def test_adaptive_steps_keep_their_tolerance_and_save_steps():
+    scene = muscle_scene(SmoothRamp(0.5, 0.05, 0.05), eta=100.0)
+    *_, reference = Dynamics(scene, TimeSteps(5e-4, newton=TIGHT)).march(0.5)
+    states = list(Dynamics(scene, TimeSteps(1e-3, tolerance=1e-6, largest=0.05)).march(0.5))
+    assert np.abs(states[-1].displacement - reference.displacement).max() < 5e-5
+    assert len(states) < 150
+    assert max(s.step for s in states) > 4 * min(s.step for s in states[1:])
+
+
+def test_convergence_lost_in_a_large_step_is_recovered_by_cutting():
+    """A full step of strong active stress needs smaller steps than the nominal one at first."""
+    muscles = ActiveMuscles({"along": Step(1.0, 0.0)}, 400e3)
+    scene = Scene(BODY, (ReportTissue(), Viscosity(20.0), muscles), (Attached("x0"),))
+    states = list(Dynamics(scene, TimeSteps(20e-3)).march(0.04))
+    assert states[-1].time == 0.04
+    assert max(np.abs(volume_changes(BODY, s.displacement)).max() for s in states) <= 1e-8
+
+
+def test_lost_convergence_says_when_where_and_why_and_keeps_the_states():
+    scene = muscle_scene(Step(1.0, 0.01))
+    strict = Tolerances(1e-16, 1e-16, iterations=3)  # cannot be met in floating point
+    seen = []
+    with pytest.raises(NotConverged, match=r"no convergence beyond t = .*DIVERGED.*cells.*det F"):
+        for state in Dynamics(scene, TimeSteps(5e-3, newton=strict)).march(0.1):
+            seen.append(state)
+    assert seen and seen[-1].time <= 0.1
+
+
+def test_run_that_loses_convergence_leaves_its_files(tmp_path):
+    muscles = ActiveMuscles({"along": Step(1.0, 0.02)}, 15e3)
+    scene = Scene(BODY, (ReportTissue(), muscles), (Attached("x0"),))
+    tolerances = Tolerances(1e-9, 1e-10, iterations=3)
+    steps = TimeSteps(0.01, smallest=9e-3, newton=tolerances)
+    with pytest.raises(NotConverged):
+        simulate(scene, 0.1, tmp_path, steps, frame_interval=0.01)
+    assert '"stopped: no convergence' in (tmp_path / "summary.json").read_text()
+    rows = (tmp_path / "steps.csv").read_text().splitlines()
+    assert len(rows) >= 3  # header, start and what was accepted
+    assert (tmp_path / "checkpoint.npz").exists() and (tmp_path / "fields.xdmf").exists()
+
+
+def test_resumed_run_gives_the_same_motion(tmp_path):
+    scene = muscle_scene(Ramp(0.4, 0.03, 0.03), Gravity())
+    steps = TimeSteps(2.5e-3, newton=Tolerances(1e-11, 1e-11))
+    whole = simulate(scene, 0.1, tmp_path / "whole", steps, frame_interval=0.01)
+    simulate(scene, 0.05, tmp_path / "parts", steps, frame_interval=0.01)
+    parts = simulate(scene, 0.1, tmp_path / "parts", steps, frame_interval=0.01, resume=True)
+    # the acceleration is estimated anew at the seam: an error of the order of the method
+    scale = np.abs(whole.last.displacement).max()
+    assert np.abs(whole.last.displacement - parts.last.displacement).max() < 2e-4 * scale
+    for name in ("steps.csv", "trajectories.csv"):
+        a, b = (np.loadtxt(tmp_path / run / name, delimiter=",", skiprows=1)
+                for run in ("whole", "parts"))  # fmt: skip
+        assert a[:, 0] == pytest.approx(b[:, 0], abs=1e-12)
+    assert [f.time for f in parts.frames] == pytest.approx([f.time for f in whole.frames])
+    other = muscle_scene(Ramp(0.5, 0.03, 0.03), Gravity())
+    with pytest.raises(BadScene, match="another scene"):
+        simulate(other, 0.1, tmp_path / "parts", steps, resume=True)
+
+
+@pytest.mark.parametrize("bad", [{"dt": 0.0}, {"dt": -1e-3}, {"dt": np.nan}, {"dt": np.inf}])
+def test_bad_steps_are_refused(bad):
+    with pytest.raises(OutOfRange, match="dt"):
+        TimeSteps(**bad)
+    with pytest.raises(OutOfRange, match="spectral_radius"):
+        TimeSteps(spectral_radius=1.1)
+    with pytest.raises(OutOfRange, match="tolerance"):
+        TimeSteps(tolerance=-1.0)
+
+
+def test_end_before_start_is_refused():
+    with pytest.raises(OutOfRange, match="end"):
+        next(Dynamics(muscle_scene(Ramp(0.1))).march(0.0))
