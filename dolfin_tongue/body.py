@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName, listing
-from dolfin_tongue.fibres import Fibres, FloatArray, IntArray
+from dolfin_tongue.fibres import Fibres
 from dolfin_tongue.shape import corner_jacobians, gauss_jacobians
 
 #: Mass density of tongue tissue, kg/m3 (as in Buchaillard et al. 2009).
@@ -54,7 +55,7 @@ class Body:
         if inverted.size:
             raise BadMesh(
                 f"{self.name}: {inverted.size} inverted cell(s) (Jacobian <= 0 at a quadrature "
-                f"point): {listing(inverted.tolist())}. Check the node order (0-3 bottom "
+                f"point): {listing(inverted)}. Check the node order (0-3 bottom "
                 "counter-clockwise, 4-7 above) and the node coordinates"
             )
 
@@ -66,7 +67,7 @@ class Body:
         bad = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
         if bad.size:
             raise BadMesh(
-                f"{self.name}: coordinates of node(s) {listing(bad.tolist())} are not finite"
+                f"{self.name}: coordinates of node(s) {listing(bad)} are not finite"
             )
         used = np.unique(self.cells)
         if used[0] < 0 or used[-1] >= len(self.points):
@@ -76,11 +77,11 @@ class Body:
             )
         if len(used) != len(self.points):
             unused = np.setdiff1d(np.arange(len(self.points)), used)
-            raise BadMesh(f"{self.name}: node(s) {listing(unused.tolist())} belong to no cell")
+            raise BadMesh(f"{self.name}: node(s) {listing(unused)} belong to no cell")
 
     def _check_names(self) -> None:
-        for name, nodes in {**self.node_sets, **self.landmarks}.items():
-            nodes = np.atleast_1d(nodes)
+        points = {name: np.array([node]) for name, node in self.landmarks.items()}
+        for name, nodes in {**self.node_sets, **points}.items():
             if not nodes.size:
                 raise BadMesh(f"{self.name}: the region {name!r} is empty")
             if nodes.min() < 0 or nodes.max() >= len(self.points):

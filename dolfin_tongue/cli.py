@@ -22,14 +22,19 @@ def _root() -> None:
     """Simulate a muscle-activated tongue."""
 
 
+Results = Annotated[Path, typer.Option(help="folder of all results")]
+Data = Annotated[
+    Path | None, typer.Option(envvar="DOLFIN_TONGUE_DATA", help="folder of a published tongue")
+]
+ShowList = Annotated[bool, typer.Option("--list", help="list the names and stop")]
+
+
 @app.command()
 def demo(
     name: Annotated[str, typer.Argument(help="which demo; see --list")] = "tongue",
-    show_list: Annotated[bool, typer.Option("--list", help="list the demos and stop")] = False,
-    results: Annotated[Path, typer.Option(help="folder of all results")] = Path("results"),
-    data: Annotated[
-        Path | None, typer.Option(envvar="DOLFIN_TONGUE_DATA", help="folder of a published tongue")
-    ] = None,
+    show_list: ShowList = False,
+    results: Results = Path("results"),
+    data: Data = None,
     dt: Annotated[float | None, typer.Option(help="time step, s; default: the demo's own")] = None,
     refinement: Annotated[int, typer.Option(help="elements per edge of each of the 42")] = 1,
     pictures: Annotated[bool, typer.Option(help="draw pictures")] = True,
@@ -37,14 +42,34 @@ def demo(
 ) -> None:
     """Run a demo; its files are in RESULTS/NAME."""
     if show_list:
-        _print_table("demos", demos.available())
-        return
-    main = demos.load(name)
+        return _print_table("demos", demos.available())
+    options = demos.Options(results / name, data, dt, refinement, pictures, resume)
+    _run("demo", name, options)
+
+
+@app.command()
+def bench(
+    name: Annotated[str, typer.Argument(help="which benchmark; see --list")] = "profile",
+    show_list: ShowList = False,
+    results: Results = Path("results"),
+    data: Data = None,
+    dt: Annotated[float | None, typer.Option(help="time step, s")] = None,
+    refinement: Annotated[int, typer.Option(help="elements per edge of each of the 42")] = 1,
+) -> None:
+    """Run a benchmark; its files are in RESULTS/bench_NAME."""
+    if show_list:
+        return _print_table("benchmarks", demos.available("benchmark"))
+    options = demos.Options(results / f"bench_{name}", data, dt, refinement)
+    _run("benchmark", name, options)
+
+
+def _run(kind: str, name: str, options: demos.Options) -> None:
+    main = demos.load(name, kind)
     begin = clock.perf_counter()
-    folder = results / name
-    numbers = main(demos.Options(folder, data, dt, refinement, pictures, resume))
-    _print_table(f"demo {name}", numbers)
-    Console().print(f"{clock.perf_counter() - begin:.1f} s in all; results in {folder}/")
+    _print_table(f"{kind} {name}", main(options))
+    Console(soft_wrap=True).print(
+        f"{clock.perf_counter() - begin:.1f} s in all; results in {options.folder}/"
+    )
 
 
 def _print_table(title: str, rows: dict) -> None:

@@ -1,4 +1,4 @@
-"""How demos are found, and what they are given."""
+"""How demos and benchmarks are found, and what they are given."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from dolfin_tongue.errors import TongueError, UnknownName
 
-#: Demos stand beside the package in a checkout.
-FOLDER = Path(__file__).resolve().parent.parent / "demos"
+#: Demos and benchmarks stand beside the package in a checkout, each a file with a `main`.
+CHECKOUT = Path(__file__).resolve().parent.parent
+FOLDERS = {"demo": CHECKOUT / "demos", "benchmark": CHECKOUT / "benchmarks"}
 
 
 @dataclass(frozen=True)
@@ -49,24 +50,26 @@ class Options:
         return self.data
 
 
-def available() -> dict[str, str]:
-    """Names of the demos and the first line of what they say of themselves."""
-    if not FOLDER.is_dir():
-        raise TongueError(f"the demos are part of a checkout; there is no folder {FOLDER}")
+def available(kind: str = "demo") -> dict[str, str]:
+    """Names of the demos (or benchmarks) and the first line of what they say of themselves."""
+    folder = FOLDERS[kind]
+    if not folder.is_dir():
+        raise TongueError(f"the {kind}s are part of a checkout; there is no folder {folder}")
     found = {}
-    for path in sorted(FOLDER.glob("*.py")):
+    for path in sorted(folder.glob("*.py")):
         text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-        found[path.stem] = text.splitlines()[0]
+        found[path.stem] = text.partition("\n")[0]
     return found
 
 
-def load(name: str) -> Callable[[Options], dict[str, Any]]:
-    """Return the `main` of a demo; UnknownName lists the known ones."""
-    if name not in available():
-        raise UnknownName("demo", name, available())
-    spec = importlib.util.spec_from_file_location(f"tongue_demo_{name}", FOLDER / f"{name}.py")
+def load(name: str, kind: str = "demo") -> Callable[[Options], dict[str, Any]]:
+    """Return the `main` of a demo or benchmark; UnknownName lists the known ones."""
+    if name not in available(kind):
+        raise UnknownName(kind, name, available(kind))
+    path = FOLDERS[kind] / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"tongue_{kind}_{name}", path)
     if spec is None or spec.loader is None:
-        raise TongueError(f"the demo {name} cannot be loaded from {FOLDER}")
+        raise TongueError(f"the {kind} {name} cannot be loaded from {path}")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.main

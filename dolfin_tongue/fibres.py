@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName, listing
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)

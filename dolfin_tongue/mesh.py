@@ -12,8 +12,8 @@ import numpy as np
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.fibres import FloatArray, IntArray
 
 #: From the brick (VTK) order of hexahedron nodes to the tensor-product order of basix.
 TENSOR_ORDER = np.array([0, 1, 3, 2, 4, 5, 7, 6])

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf, nextafter
+from typing import Any
 
 import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
 
+from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.compile import compile_form
-from dolfin_tongue.fibres import FloatArray
 from dolfin_tongue.shape import gauss_jacobians
 from dolfin_tongue.state import State
 from dolfin_tongue.system import System
@@ -133,11 +134,12 @@ class EnergyAudit:
         if self._start is None:
             self._start = total
         balance = total - self._start - sum(self.works.values())
-        record = {f"{name}_J": float(v) for name, v in zip(self.energy_names, energies, strict=True)}
+        named = zip(self.energy_names, energies, strict=True)
+        record = {f"{name}_J": float(value) for name, value in named}
         record |= {f"work_{name}_J": value for name, value in self.works.items()}
         return record | {"balance_J": balance, "exchanged_J": self.exchanged}
 
-    def memory(self) -> dict[str, float | list[float]]:
+    def memory(self) -> dict[str, Any]:
         """Return what has to be kept to continue the account in a resumed run."""
         return {
             "start": float(self._start or 0.0),
@@ -145,7 +147,7 @@ class EnergyAudit:
             "works": list(self.works.values()),
         }
 
-    def restore(self, memory: dict[str, float | list[float]], state: State) -> None:
+    def restore(self, memory: dict[str, Any], state: State) -> None:
         """Continue the account of an earlier run at its last state."""
         self._start, self.exchanged = memory["start"], memory["exchanged"]
         self.works = dict(zip(self.work_names, memory["works"], strict=True))

@@ -6,9 +6,8 @@ import csv
 import hashlib
 import json
 import pickle
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Literal, TextIO
 
 import numpy as np
 
@@ -31,6 +30,7 @@ class Table:
     def __init__(self, path: Path):
         self.path = path
         self._file: TextIO | None = None
+        self._writer: csv.DictWriter | None = None
 
     def continue_until(self, time: float) -> None:
         """Keep the rows of an earlier run up to a time (first column, s)."""
@@ -38,12 +38,12 @@ class Table:
             header, *rows = list(csv.reader(file))
         kept = [row for row in rows if len(row) == len(header) and float(row[0]) <= time]
         write_text(self.path, "".join(",".join(row) + "\n" for row in [header, *kept]))
-        self._open(header, "a")
+        self._file, self._writer = self._open(header, "a")
 
     def append(self, row: dict[str, Any]) -> None:
         """Add a row; the first one gives the column names."""
-        if self._file is None:
-            self._open(list(row), "w")
+        if self._file is None or self._writer is None:
+            self._file, self._writer = self._open(list(row), "w")
             self._writer.writeheader()
         self._writer.writerow(row)
         self._file.flush()
@@ -53,9 +53,9 @@ class Table:
         if self._file:
             self._file.close()
 
-    def _open(self, columns: Iterable[str], mode: str) -> None:
-        self._file = self.path.open(mode, newline="", encoding="utf-8")
-        self._writer = csv.DictWriter(self._file, list(columns), lineterminator="\n")
+    def _open(self, columns: list[str], mode: Literal["w", "a"]) -> tuple[TextIO, csv.DictWriter]:
+        file = self.path.open(mode, newline="", encoding="utf-8")
+        return file, csv.DictWriter(file, columns, lineterminator="\n")
 
 
 class Recorder:

@@ -47,11 +47,11 @@ def picture_shapes(body: Body, shapes: Mapping[str, State], path: Path) -> None:
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """Columns of a CSV table by name."""
     table = np.genfromtxt(path, delimiter=",", names=True)
-    return {name: np.atleast_1d(table[name]) for name in table.dtype.names}
+    return {name: np.atleast_1d(table[name]) for name in table.dtype.names or ()}
 
 
 def _landmark_paths(folder: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Times (s) and positions, shape (k, 3), mm, of each landmark."""
+    """Return times (s) and positions, shape (k, 3), mm, of each landmark."""
     columns = read_table(folder / "trajectories.csv")
     names = [name[: -len("_x_m")] for name in columns if name.endswith("_x_m")]
     return {

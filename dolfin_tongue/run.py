@@ -75,23 +75,21 @@ def simulate(
     watch = _Watch()
     start = _resumed(recorder, audit, watch) if resume else None
     watch.set_up = clock.perf_counter() - set_up
-    status, last = "finished", start
+    status, last = "finished", start or dynamics.rest()
     try:
-        if start is None or start.time < end:
-            for state in dynamics.march(end, start):
-                last = state
-                if state is not start:
-                    watch.observed(lambda s=state: _observe(s, audit, recorder, watch))
-                if progress:
-                    progress(state.time)
+        for state in dynamics.march(end, start) if last.time < end else ():
+            last = state
+            if state is not start:
+                _observe(state, audit, recorder, watch)
+            if progress:
+                progress(state.time)
     except (NotConverged, KeyboardInterrupt) as error:
         status = f"stopped: {error or type(error).__name__}"
         raise
     finally:
-        if last is not None:
-            recorder.checkpoint(last, _memory(audit, watch))
-            summary = _summary(scene, dynamics, audit, watch, last, status)
-            recorder.summary(summary)
+        recorder.checkpoint(last, _memory(audit, watch))
+        summary = _summary(scene, dynamics, audit, watch, last, status)
+        recorder.summary(summary)
         recorder.close()
     return Run(scene, folder, recorder.frames.read_all(), last, summary)
 
@@ -108,12 +106,6 @@ class _Watch:
     volume: float = 0.0
     local_volume: float = 0.0
     balance: float = 0.0
-
-    def observed(self, action: Callable[[], None]) -> None:
-        """Run an action and count its time as observation."""
-        before = clock.perf_counter()
-        action()
-        self.observing += clock.perf_counter() - before
 
 
 def _memory(audit: EnergyAudit, watch: _Watch) -> dict[str, Any]:
@@ -135,6 +127,7 @@ def _resumed(recorder: Recorder, audit: EnergyAudit, watch: _Watch) -> State | N
 
 def _observe(state: State, audit: EnergyAudit, recorder: Recorder, watch: _Watch) -> None:
     """Observe a new state, record it, and write a checkpoint where one is due."""
+    begin = clock.perf_counter()
     body = recorder.scene.body
     volume = float(np.abs(volume_changes(body, state.displacement)).max())
     local = np.abs(volume_ratios(body.points, state.displacement, body.cells) - 1).max()
@@ -147,6 +140,7 @@ def _observe(state: State, audit: EnergyAudit, recorder: Recorder, watch: _Watch
     if clock.perf_counter() - watch.last_checkpoint > CHECKPOINT_INTERVAL:
         recorder.checkpoint(state, _memory(audit, watch))
         watch.last_checkpoint = clock.perf_counter()
+    watch.observing += clock.perf_counter() - begin
 
 
 def _summary(

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dolfin_tongue.arrays import IntArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import BadScene, listing
-from dolfin_tongue.fibres import IntArray
 from dolfin_tongue.term import Support, Term
 
 
@@ -72,7 +72,7 @@ class Scene:
         stuck = np.flatnonzero(~free.any(axis=1))
         if stuck.size:
             raise BadScene(
-                f"all nodes of cell(s) {listing(stuck.tolist())} are held, so that nothing "
+                f"all nodes of cell(s) {listing(stuck)} are held, so that nothing "
                 "determines their pressure; hold fewer nodes or leave these cells out of the body"
             )
 

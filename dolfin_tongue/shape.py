@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from dolfin_tongue.arrays import FloatArray, IntArray
 
 #: Corners of the master element [-1, 1]^3 in the usual brick order, shape (8, 3).
 CORNERS = np.array(
@@ -36,12 +35,12 @@ def shape_gradients(xi: FloatArray) -> FloatArray:
     return gradient
 
 
-def _jacobians(points: FloatArray, cells: npt.NDArray, xi: FloatArray) -> FloatArray:
+def _jacobians(points: FloatArray, cells: IntArray, xi: FloatArray) -> FloatArray:
     """dX/dxi in all cells at the points xi, shape (m, q, 3, 3)."""
     return np.einsum("mki,qkj->mqij", points[cells], shape_gradients(xi))
 
 
-def gauss_jacobians(points: FloatArray, cells: npt.NDArray) -> FloatArray:
+def gauss_jacobians(points: FloatArray, cells: IntArray) -> FloatArray:
     """Jacobian determinants times weight (1) at the 2x2x2 Gauss points.
 
     Their sum over the points is the exact volume of the cell, since the determinant of a trilinear
@@ -59,7 +58,7 @@ def gauss_jacobians(points: FloatArray, cells: npt.NDArray) -> FloatArray:
     return np.linalg.det(_jacobians(points, cells, CORNERS / np.sqrt(3.0)))
 
 
-def volume_ratios(points: FloatArray, displacement: FloatArray, cells: npt.NDArray) -> FloatArray:
+def volume_ratios(points: FloatArray, displacement: FloatArray, cells: IntArray) -> FloatArray:
     """Det F at the 2x2x2 Gauss points of all cells, shape (m, 8).
 
     A cell keeps its mean volume; what it leaves free inside shows what the mesh is worth.
@@ -67,7 +66,7 @@ def volume_ratios(points: FloatArray, displacement: FloatArray, cells: npt.NDArr
     return gauss_jacobians(points + displacement, cells) / gauss_jacobians(points, cells)
 
 
-def corner_jacobians(points: FloatArray, cells: npt.NDArray) -> FloatArray:
+def corner_jacobians(points: FloatArray, cells: IntArray) -> FloatArray:
     """Scaled Jacobians at the corners: determinant over the product of the three edge lengths.
 
     Returns

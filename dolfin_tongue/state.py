@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dolfin_tongue.fibres import FloatArray
+from dolfin_tongue.arrays import FloatArray
 
 
 @dataclass(frozen=True)

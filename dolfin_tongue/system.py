@@ -8,6 +8,7 @@ accepted state keeps its volumes, while the rows of momentum are stated at the s
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import ufl
@@ -15,11 +16,11 @@ from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from petsc4py import PETSc
 
+from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.compile import compile_form
 from dolfin_tongue.constitutive.incompressible import pressure_power, volume_condition
 from dolfin_tongue.errors import BadScene
-from dolfin_tongue.fibres import FloatArray
-from dolfin_tongue.kinematics import Expr, Kinematics
+from dolfin_tongue.kinematics import Kinematics
 from dolfin_tongue.mesh import cell_function, mixed_space, set_cell_values
 from dolfin_tongue.scene import Scene
 
@@ -96,10 +97,10 @@ class System:
         grid, space = self.space.mesh, self.space.space
         self.dx = ufl.Measure("dx", grid, metadata={"quadrature_degree": QUADRATURE_DEGREE})
         self.state = fem.Function(space, name="state")
-        self.load = None if self.dynamic else fem.Constant(grid, 1.0)
+        self.load: Any = None if self.dynamic else fem.Constant(grid, 1.0)
         self.end_state = fem.Function(space, name="end") if self.dynamic else self.state
-        self.rate = fem.Function(space, name="rate") if self.dynamic else None
-        self.acceleration = fem.Function(space, name="acceleration") if self.dynamic else None
+        self.rate: Any = fem.Function(space, name="rate") if self.dynamic else None
+        self.acceleration: Any = fem.Function(space, name="acceleration") if self.dynamic else None
         self._shifts = [fem.Constant(grid, 0.0) for _ in range(3)] if self.dynamic else []
 
     def number(self, value: float) -> fem.Constant:
@@ -129,7 +130,7 @@ class System:
         return form + volume_condition(end, test_p)
 
     def _jacobian_form(self, residual: ufl.Form) -> ufl.Form:
-        """Derivative by the state, plus shifted derivatives by those other states that occur."""
+        """Differentiate by the state, plus shifted derivatives by those other states that occur."""
         trial = ufl.TrialFunction(self.space.space)
         form = ufl.derivative(residual, self.state, trial)
         if self.dynamic:

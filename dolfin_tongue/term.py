@@ -13,9 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 import ufl
 
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import OutOfRange
-from dolfin_tongue.fibres import FloatArray, IntArray
 from dolfin_tongue.kinematics import Expr, Kinematics
 
 

@@ -92,7 +92,7 @@ def unit_block(
 
 def _factors(refinement: int | Sequence[int]) -> tuple[int, int, int]:
     """Refinement along r, s and t; checked."""
-    values = [refinement] * 3 if np.ndim(refinement) == 0 else list(refinement)
+    values = list(refinement) if isinstance(refinement, Sequence) else [refinement] * 3
     whole = len(values) == 3 and all(isinstance(v, int | np.integer) for v in values)
     if not whole or min(values) < 1:
         raise OutOfRange("refinement", refinement, "a whole number >= 1, or three of them")
@@ -166,7 +166,7 @@ class _Lattice:
             [(i, i) for i in range(first, last + 1)] + [(i, i + 1) for i in range(first, last)]
             for first, last in limits
         ]
-        for box in product(*intervals):
+        for box in product(intervals[0], intervals[1], intervals[2]):
             if _dimension(box) == dimension:
                 yield box
 

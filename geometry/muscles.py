@@ -129,7 +129,7 @@ def _muscle(
     """Fibres of one muscle in the cells of a block."""
     steps, shares = _spread(parts)
     scale = CROSS_SECTIONS[name] * mm**2 / mesh_cross_section(steps, shares, solid, volumes)
-    parents: list[Parent] = [(i, j, k) for i, j, k in block.parents.tolist()]
+    parents: list[Parent] = [(int(i), int(j), int(k)) for i, j, k in block.parents]
     cells: IntArray = np.array([c for c, parent in enumerate(parents) if parent in steps])
     in_block = np.array([steps[parents[c]] / DIVISIONS for c in cells])
     density = scale * np.array([shares[parents[c]] for c in cells])
@@ -151,8 +151,9 @@ def _parent_volumes(block: Block, solid: BezierSolid) -> dict[Parent, float]:
     """Volume of every parent as its cells fill it, m3; so a force is the same in any refinement."""
     volumes = gauss_jacobians(solid.map(block.rst), block.cells).sum(axis=1)
     total: dict[Parent, float] = {}
-    for (i, j, k), volume in zip(block.parents.tolist(), volumes, strict=True):
-        total[i, j, k] = total.get((i, j, k), 0.0) + float(volume)
+    for (i, j, k), volume in zip(block.parents, volumes, strict=True):
+        parent = (int(i), int(j), int(k))
+        total[parent] = total.get(parent, 0.0) + float(volume)
     return total
 
 

@@ -50,7 +50,8 @@ def random_states(system, seed=1, amplitude=0.1):
     rng = np.random.default_rng(seed)
     shape, cells = system.scene.body.points.shape, len(system.scene.body.cells)
     edge = 0.01
-    y = system.mixed(amplitude * edge * rng.standard_normal(shape), 500 * rng.standard_normal(cells))
+    pressure = 500 * rng.standard_normal(cells)
+    y = system.mixed(amplitude * edge * rng.standard_normal(shape), pressure)
     v = system.mixed(3 * amplitude * edge * rng.standard_normal(shape))
     a = system.mixed(rng.standard_normal(shape))
     return y, v, a

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.fibres import FloatArray, IntArray
 from dolfin_tongue.term import Support
 
 

@@ -168,7 +168,8 @@ class Table:
         for i, (before, after) in enumerate(zip(self.times, self.times[1:], strict=False)):
             if not after > before:
                 raise BadScene(
-                    f"the times of a table must increase: row {i + 1} has {after} s after {before} s"
+                    f"the times of a table must increase: row {i + 1} has {after} s after "
+                    f"{before} s"
                 )
         for time in self.times:
             require_time(time, "time in a table")

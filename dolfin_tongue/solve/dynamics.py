@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 from petsc4py import PETSc
 
+from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.errors import NotConverged, OutOfRange
-from dolfin_tongue.fibres import FloatArray
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.solve.failure import where_and_why
 from dolfin_tongue.solve.newton import SNES_OPTIONS, Newton, Tolerances, reason_name, set_options
@@ -130,7 +130,7 @@ class Dynamics:
 
     def _predict(self, snes: PETSc.SNES, guess: PETSc.Vec) -> None:
         """Start Newton from an extrapolated displacement; TS itself would start from no motion."""
-        state, rate = self.ts.getSolution2()
+        _, rate = self.ts.getSolution2()
         velocity = rate.array_r
         if self._velocity_before is not None:
             velocity = 1.5 * velocity - 0.5 * self._velocity_before
@@ -165,7 +165,8 @@ class Dynamics:
         for segment_start, segment_end in pairwise([state.time, *inner, end]):
             if segment_start in jumps:
                 self._restart()
-            for state in self._march_segment(state, segment_end):
+            for accepted in self._march_segment(state, segment_end):
+                state = accepted
                 yield state
 
     def rest(self, time: float = 0.0) -> State:
@@ -274,7 +275,7 @@ class Dynamics:
         """State at the end of a step, with the pressure extrapolated from the stages."""
         solution, rate = self.ts.getSolution2()
         alpha_f = 1 / (1 + self.steps.spectral_radius)
-        pressure = self._stage_pressure
+        pressure: FloatArray = self._stage_pressure
         if self._stage_pressure_before is not None:
             pressure = pressure + (1 - alpha_f) * (pressure - self._stage_pressure_before)
         self._stage_pressure_before = self._stage_pressure

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import listing
-from dolfin_tongue.fibres import FloatArray
 from dolfin_tongue.shape import volume_ratios
 
 

@@ -14,8 +14,8 @@ from math import isclose
 import numpy as np
 from petsc4py import PETSc
 
+from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.errors import OutOfRange
-from dolfin_tongue.fibres import FloatArray
 from dolfin_tongue.system import System
 from dolfin_tongue.term import require_positive
 
