@@ -41,10 +41,11 @@ def main(options: Options) -> dict[str, object]:
     _write_table(options, moved)
     if options.pictures:
         picture_shapes(body, shapes, options.folder / "final_shapes.png")
+    print("displacement from rest under gravity in mm, x to the back and z up:")
     return {
-        case: "  ".join(f"{name} {x[0]:+6.1f} {x[2]:+6.1f}" for name, x in row.items())
+        case: {f"{name} {'xyz'[i]}": f"{x[i]:+.1f}" for name, x in row.items() for i in (0, 2)}
         for case, row in moved.items()
-    } | {"": "displacement from rest, mm: x (back +), z (up +)"}
+    }
 
 
 def _write_table(options: Options, moved: dict) -> None:

@@ -66,9 +66,7 @@ class Body:
             raise BadMesh(f"{self.name}: cells must have shape (m, 8), not {self.cells.shape}")
         bad = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
         if bad.size:
-            raise BadMesh(
-                f"{self.name}: coordinates of node(s) {listing(bad)} are not finite"
-            )
+            raise BadMesh(f"{self.name}: coordinates of node(s) {listing(bad)} are not finite")
         used = np.unique(self.cells)
         if used[0] < 0 or used[-1] >= len(self.points):
             raise BadMesh(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 import time as clock
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from dolfin_tongue import demo as demos
 from dolfin_tongue.errors import TongueError
@@ -72,11 +73,20 @@ def _run(kind: str, name: str, options: demos.Options) -> None:
     )
 
 
-def _print_table(title: str, rows: dict) -> None:
-    table = Table(title=title, show_header=False)
+def _print_table(title: str, rows: Mapping[str, Any]) -> None:
+    """Print names and values; values that are mappings themselves become columns."""
+    columns = next((list(v) for v in rows.values() if isinstance(v, Mapping)), [])
+    table = Table(Column("", no_wrap=True), *columns, title=title, show_header=bool(columns))
     for name, value in rows.items():
-        table.add_row(str(name), f"{value:.4g}" if isinstance(value, float) else str(value))
-    Console().print(table)
+        values = value.values() if isinstance(value, Mapping) else [value]
+        table.add_row(str(name), *(_text(x) for x in values))
+    # a pipe has no width: 120 columns, so that nothing is folded in a log
+    console = Console() if sys.stdout.isatty() else Console(width=120)
+    console.print(table)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def run() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dolfin_tongue import view
 from dolfin_tongue.body import Body
+from dolfin_tongue.boundary import Attached
 from dolfin_tongue.run import Run
 from dolfin_tongue.state import State
 
@@ -28,10 +29,10 @@ def picture_run(run: Run, title: str) -> None:
     title : over the sheet.
     """
     body, folder = run.scene.body, run.folder
-    chosen = np.linspace(0, len(run.frames) - 1, min(SHEET_FRAMES, len(run.frames)))
-    frames = [run.frames[i] for i in np.unique(chosen.round().astype(int))]
-    view.contact_sheet(body, frames, folder / "sheet.png", title=title)
-    view.animation(body, run.frames, folder / "animation.gif")
+    frames = view.telling_frames(run.frames, SHEET_FRAMES)
+    fixed = [r for s in run.scene.supports if isinstance(s, Attached) for r in s.regions]
+    view.contact_sheet(body, frames, folder / "sheet.png", title=title, fixed=fixed)
+    view.animation(body, run.frames, folder / "animation.gif", fixed=fixed)
     if body.fibres.muscles:
         view.fibre_pictures(body, folder / "fibres")
     view.shape_picture(body, run.last, folder / "shape.png")

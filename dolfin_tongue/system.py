@@ -164,8 +164,8 @@ class System:
         out[:] = 0.0
         fem.assemble_vector(out, self._residual)
         if self._held_dofs.size:
-            out[self._held_dofs] = (
-                self.end_state.x.array[self._held_dofs] - self.held_displacement(time_end)
+            out[self._held_dofs] = self.end_state.x.array[self._held_dofs] - self.held_displacement(
+                time_end
             )
 
     def jacobian(self, matrix: PETSc.Mat, shifts: tuple[float, float, float] = (0, 0, 0)) -> None:

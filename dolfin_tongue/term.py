@@ -84,7 +84,7 @@ class Support(ABC):
 
         Parameters
         ----------
-        points : ndarray, shape (k, 3), m -- reference positions of the nodes, as `nodes` lists them.
+        points : ndarray, shape (k, 3), m -- reference positions of the nodes, in order of `nodes`.
         time : s.
 
         Returns

@@ -121,7 +121,8 @@ def preliminary_tongue(
     solid = BezierSolid(control)
     block = unit_block(refinement, REGIONS)
     landmarks = {
-        name: block.node_at([float(x) for x in np.divide(node, DIVISIONS)]) for name, node in LANDMARKS.items()
+        name: block.node_at([float(x) for x in np.divide(node, DIVISIONS)])
+        for name, node in LANDMARKS.items()
     }
     regions = {**block.regions, "midsagittal_contour": _outline(block)}
     body = Body(

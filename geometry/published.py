@@ -32,9 +32,7 @@ MAX_STRESS = 220.0 * kPa
 FILES = ("tongue.vtu", "muscles.json", "attachments.json")
 
 
-def published_tongue(
-    folder: Path | str, muscles: Literal["groups", "bundles"] = "groups"
-) -> Body:
+def published_tongue(folder: Path | str, muscles: Literal["groups", "bundles"] = "groups") -> Body:
     """Read the published tongue.
 
     Parameters

@@ -49,7 +49,13 @@ def tongue(*arguments, path=None, cwd=TOP, **variables):
     """Run the launcher, with the folder `path` in front of PATH and no other variables than `variables`."""
     variables["PATH"] = f"{path}:{os.environ['PATH']}" if path else os.environ["PATH"]
     return subprocess.run(
-        [LAUNCHER, *arguments], cwd=cwd, env=variables, capture_output=True, text=True, timeout=60, check=False
+        [LAUNCHER, *arguments],
+        cwd=cwd,
+        env=variables,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
 
 
@@ -86,7 +92,9 @@ def test_help_lists_the_commands():
         assert re.search(rf"^  {command}\b", done.stdout, re.MULTILINE), command
 
 
-@pytest.mark.parametrize(("arguments", "message"), [(["sing"], "unknown command 'sing'"), ([], "usage:")])
+@pytest.mark.parametrize(
+    ("arguments", "message"), [(["sing"], "unknown command 'sing'"), ([], "usage:")]
+)
 def test_unknown_and_missing_command(arguments, message):
     done = tongue(*arguments)
     assert done.returncode == 2
@@ -125,7 +133,14 @@ def test_data_folder_becomes_a_full_path(tmp_path):
     code = "import os, sys; print([os.environ['DOLFIN_TONGUE_DATA'], *sys.argv[1:]])"
     (tmp_path / "data").mkdir()
     done = direct(
-        "python", "-c", code, "--data", "data", "--data=data", cwd=tmp_path, DOLFIN_TONGUE_DATA="data"
+        "python",
+        "-c",
+        code,
+        "--data",
+        "data",
+        "--data=data",
+        cwd=tmp_path,
+        DOLFIN_TONGUE_DATA="data",
     )
     data = str(tmp_path / "data")
     assert ast.literal_eval(done.stdout) == [data, "--data", data, f"--data={data}"]
@@ -150,7 +165,11 @@ def test_each_run_has_a_display_that_ends_with_it():
     variables = {"PATH": os.environ["PATH"], "DOLFIN_TONGUE_ENGINE": "direct"}
     runs = [
         subprocess.Popen(
-            [LAUNCHER, "python", "-c", code], env=variables, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [LAUNCHER, "python", "-c", code],
+            env=variables,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
         )
         for _ in range(3)
     ]
@@ -210,17 +229,32 @@ esac
 """
 
 
-@pytest.mark.parametrize(("info", "user"), [("Server: 1.0", "1000:1000"), ("  rootless: true", "0:0")])
+@pytest.mark.parametrize(
+    ("info", "user"), [("Server: 1.0", "1000:1000"), ("  rootless: true", "0:0")]
+)
 def test_what_a_container_gets(play, tmp_path, info, user):
     data, cache = tmp_path / "data", tmp_path / "cache"
     data.mkdir()
     path = play(docker=ENGINE.format(info=info, missing=0, output="", code=0))
-    done = tongue("demo", "--data", str(data), path=path, DOLFIN_TONGUE_CACHE=str(cache), OMP_NUM_THREADS="2", CI="1")
+    done = tongue(
+        "demo",
+        "--data",
+        str(data),
+        path=path,
+        DOLFIN_TONGUE_CACHE=str(cache),
+        OMP_NUM_THREADS="2",
+        CI="1",
+    )
     words = done.stdout.splitlines()
     for mount in [f"{TOP}:{TOP}", f"{cache}:{cache}", f"{data}:{data}:ro"]:
         assert words[words.index(mount) - 1] == "--volume"
     assert words[words.index("--user") + 1] == user
-    assert {"DOLFIN_TONGUE_ENGINE=direct", f"DOLFIN_TONGUE_CACHE={cache}", "OMP_NUM_THREADS=2", "CI=1"} <= set(words)
+    assert {
+        "DOLFIN_TONGUE_ENGINE=direct",
+        f"DOLFIN_TONGUE_CACHE={cache}",
+        "OMP_NUM_THREADS=2",
+        "CI=1",
+    } <= set(words)
     assert words[-4:] == [str(LAUNCHER), "demo", "--data", str(data)]
 
 
@@ -271,7 +305,9 @@ def test_the_dockerfile_installs_what_the_code_imports():
     packages = set(re.findall(r"[a-z0-9][\w.+-]+", DOCKERFILE.read_text()))
     for module, file in _imported_modules().items():
         assert module in PACKAGE_OF, f"{file} imports {module}: which Debian package is that?"
-        assert PACKAGE_OF[module] in packages, f"{file} imports {module}: {PACKAGE_OF[module]} is not in the Dockerfile"
+        assert PACKAGE_OF[module] in packages, (
+            f"{file} imports {module}: {PACKAGE_OF[module]} is not in the Dockerfile"
+        )
 
 
 def test_no_registry_or_server_is_named():

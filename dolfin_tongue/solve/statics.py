@@ -28,9 +28,7 @@ class Statics:
     time : at which activations are evaluated, s (default: when all ramps are over).
     """
 
-    def __init__(
-        self, scene: Scene, tolerances: Tolerances = STATIC_TOLERANCES, time: float = 1e9
-    ):
+    def __init__(self, scene: Scene, tolerances: Tolerances = STATIC_TOLERANCES, time: float = 1e9):
         self.system = System(scene, dynamic=False)
         self.time = time
         snes = PETSc.SNES().create(PETSc.COMM_SELF)

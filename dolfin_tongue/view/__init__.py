@@ -1,0 +1,26 @@
+"""Pictures of bodies, states and records. Importing this needs no display and no VTK.
+
+In all pictures the tip of the tongue is to the LEFT and up is upwards, as in midsagittal views of
+speech science; see `dolfin_tongue.view.camera`.
+"""
+
+from dolfin_tongue.view.animation import animation
+from dolfin_tongue.view.camera import OBLIQUE, SIDE, View
+from dolfin_tongue.view.fibres import fibre_pictures
+from dolfin_tongue.view.picture import shape_picture
+from dolfin_tongue.view.plots import energy_plot, trajectories
+from dolfin_tongue.view.sheet import contact_sheet, final_shapes, telling_frames
+
+__all__ = [
+    "OBLIQUE",
+    "SIDE",
+    "View",
+    "animation",
+    "contact_sheet",
+    "energy_plot",
+    "fibre_pictures",
+    "final_shapes",
+    "shape_picture",
+    "telling_frames",
+    "trajectories",
+]
