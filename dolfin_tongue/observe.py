@@ -84,8 +84,9 @@ class EnergyAudit:
         if not forms:
             return None
         count = len(forms)
-        element = basix.ufl.element("DG", "hexahedron", 0, shape=(max(2, count),))
-        test = ufl.TestFunction(fem.functionspace(self._system.space.mesh, element))
+        grid = self._system.space.mesh
+        element = basix.ufl.element("DG", grid.topology.cell_name(), 0, shape=(max(2, count),))
+        test = ufl.TestFunction(fem.functionspace(grid, element))
         total = ufl.Form([])
         for i, form in enumerate(forms):
             for integral in form.integrals():
@@ -95,15 +96,14 @@ class EnergyAudit:
     def _evaluate(self, form: fem.Form | None, count: int) -> FloatArray:
         if form is None:
             return np.zeros(0)
-        cells = len(self._system.scene.body.cells)
+        cells = len(self._system.space.parents)
         vector = np.zeros(cells * max(2, count))
         fem.assemble_vector(vector, form)
         return vector.reshape(cells, -1).sum(axis=0)[:count]
 
     def _set(self, state: State, time: float) -> None:
-        mixed = self._system.mixed(state.displacement)
-        rate = self._system.mixed(state.velocity)
-        self._system.set_state(time, mixed, rate, np.zeros_like(rate), mixed)
+        y, rate = self._system.vectors(state)
+        self._system.set_state(time, y, rate, np.zeros_like(rate), y)
 
     def powers(self, state: State, time: float) -> FloatArray:
         """Power that each rate term adds to the body (W), in the order of `work_names`."""
@@ -157,15 +157,20 @@ class EnergyAudit:
 
 def hermite_middle(first: State, second: State) -> State:
     """State in the middle of a step, on the cubic path through both ends and their velocities."""
+
+    def middle(x0: FloatArray, x1: FloatArray, v0: FloatArray, v1: FloatArray) -> tuple:
+        return (x0 + x1) / 2 + dt / 8 * (v0 - v1), 1.5 * (x1 - x0) / dt - (v0 + v1) / 4
+
     dt = second.time - first.time
-    moved = second.displacement - first.displacement
-    return State(
-        time=first.time + dt / 2,
-        displacement=first.displacement + moved / 2 + dt / 8 * (first.velocity - second.velocity),
-        velocity=1.5 * moved / dt - (first.velocity + second.velocity) / 4,
-        pressure=(first.pressure + second.pressure) / 2,
-        step=dt / 2,
+    displacement, velocity = middle(
+        first.displacement, second.displacement, first.velocity, second.velocity
     )
+    unknowns = None
+    if first.unknowns and second.unknowns:
+        (y0, v0), (y1, v1) = first.unknowns, second.unknowns
+        unknowns = middle(y0, y1, v0, v1)
+    pressure = (first.pressure + second.pressure) / 2
+    return State(first.time + dt / 2, displacement, velocity, pressure, dt / 2, 0, unknowns)
 
 
 def _labels(terms: Sequence[Term]) -> list[str]:

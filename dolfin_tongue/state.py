@@ -19,6 +19,8 @@ class State:
     pressure : ndarray, shape (m,), Pa, positive in compression.
     step : length of the step that led here, s; 0 for an initial state.
     iterations : Newton iterations of that step.
+    unknowns : the solver's own vectors of y and y', where nodal values do not say everything (a
+        quadratic displacement).
     """
 
     time: float
@@ -27,3 +29,4 @@ class State:
     pressure: FloatArray
     step: float = 0.0
     iterations: int = 0
+    unknowns: tuple[FloatArray, FloatArray] | None = None

@@ -19,14 +19,11 @@ from petsc4py import PETSc
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.compile import compile_form
 from dolfin_tongue.constitutive.incompressible import pressure_power, volume_condition
-from dolfin_tongue.errors import BadScene
+from dolfin_tongue.errors import BadScene, listing
 from dolfin_tongue.kinematics import Kinematics
 from dolfin_tongue.mesh import cell_function, mixed_space, set_cell_values
 from dolfin_tongue.scene import Scene
-
-#: 2x2x2 Gauss points on hexahedra, as in the report.
-QUADRATURE_DEGREE = 3
-
+from dolfin_tongue.state import State
 
 class CellFields:
     """Cell-wise coefficients of the terms (see `term.Fields`); those that vary follow the time."""
@@ -41,7 +38,7 @@ class CellFields:
         """Coefficient with constant values of shape (m,) or (m, k), in the body's order."""
         components = values.shape[1] if values.ndim > 1 else 1
         function = cell_function(self._space.mesh, components)
-        set_cell_values(function, values, self._space.cell_order)
+        set_cell_values(function, values, self._space.parents)
         return function
 
     def varying_on_cells(self, values: Callable[[float], FloatArray]) -> fem.Function:
@@ -55,7 +52,7 @@ class CellFields:
         """Evaluate the varying coefficients at a time, s."""
         if time != self._time:
             for function, values in self._varying:
-                set_cell_values(function, values(time), self._space.cell_order)
+                set_cell_values(function, values(time), self._space.parents)
             self._time = time
 
 
@@ -67,14 +64,15 @@ class System:
     scene : body, terms, supports.
     dynamic : with inertia and rates; otherwise a static problem with a load factor, in which no
         velocity, no acceleration and no mass exist.
+    pair : displacement and pressure spaces, see `mesh.PAIRS`.
     """
 
-    def __init__(self, scene: Scene, dynamic: bool):
+    def __init__(self, scene: Scene, dynamic: bool, pair: str = "Q1/P0"):
         scene.check_volumes()
         if not dynamic:
             scene.check_static()
         self.scene, self.dynamic = scene, dynamic
-        self.space = mixed_space(scene.body)
+        self.space = mixed_space(scene.body, pair)
         self.fields = CellFields(self.space)
         self._build_states()
         self.terms_in_form: list = []
@@ -84,18 +82,26 @@ class System:
         self._residual = compile_form(residual)
         self._jacobian = compile_form(self.jacobian_form)
         self._pressure_dofs = self.space.pressure_dofs
-        self._volumes = scene.body.volumes
+        self._pressure_weights = self._weights_of_pressure()
         held = [support.nodes(scene.body) for support in scene.supports]
-        nodes = np.concatenate([*held, []]).astype(np.int64)
-        self._held_dofs = self.space.displacement_dofs[nodes].astype(np.int32)
+        groups = self.space.held(np.concatenate([*held, []]).astype(np.int64))
+        self._held_corners = [corners for _, corners in groups]
+        self._held_dofs = np.concatenate([dofs for dofs, _ in groups]).astype(np.int32)
         self._held_points = [scene.body.points[part] for part in held]
+        stuck = self.space.cells_of_stuck_pressures(self._held_dofs)
+        if stuck.size:
+            raise BadScene(
+                f"nothing determines the pressure at a corner of cell(s) {listing(stuck)}: all "
+                f"displacement around it is held; refine the mesh or take another pair than {pair}"
+            )
 
     # -- forms ---------------------------------------------------------------------------------
 
     def _build_states(self) -> None:
         """Coefficients for the states the residual depends on, and the constants of the method."""
         grid, space = self.space.mesh, self.space.space
-        self.dx = ufl.Measure("dx", grid, metadata={"quadrature_degree": QUADRATURE_DEGREE})
+        degree = self.space.pair.quadrature_degree
+        self.dx = ufl.Measure("dx", grid, metadata={"quadrature_degree": degree})
         self.state = fem.Function(space, name="state")
         self.load: Any = None if self.dynamic else fem.Constant(grid, 1.0)
         self.end_state = fem.Function(space, name="end") if self.dynamic else self.state
@@ -186,13 +192,26 @@ class System:
         return matrix
 
     def held_displacement(self, time: float) -> FloatArray:
-        """Prescribed displacement of the held nodes, shape (number of them, 3), m."""
+        """Prescribed displacement of the held dofs, shape (number of points, 3), m."""
         supports = zip(self.scene.supports, self._held_points, strict=True)
-        return np.concatenate([support.displacement(x, time) for support, x in supports])
+        nodes = np.concatenate([support.displacement(x, time) for support, x in supports])
+        return np.concatenate([nodes[corners].mean(axis=1) for corners in self._held_corners])
 
     def volume_change(self, residual: FloatArray) -> FloatArray:
-        """Relative volume change of every cell from a residual vector, shape (m,)."""
-        return -residual[self._pressure_dofs] / self._volumes
+        """Relative volume change that each pressure dof sees, from a residual vector.
+
+        For Q1/P0 that is the relative volume change of every cell, shape (m,), in the body's order.
+        """
+        return -residual[self._pressure_dofs] / self._pressure_weights
+
+    def _weights_of_pressure(self) -> FloatArray:
+        """Integral of q^2 of each pressure shape function, m3; for Q1/P0 the cells' volumes."""
+        if self.space.pair.pressure == ("DG", 0):
+            return self.scene.body.volumes
+        _, trial_p = ufl.TrialFunctions(self.space.space)
+        _, test_p = ufl.TestFunctions(self.space.space)
+        matrix = fem.assemble_matrix(compile_form(trial_p * test_p * self.dx))
+        return matrix.to_scipy().diagonal()[self._pressure_dofs]
 
     # -- between mixed arrays and arrays in the body's order -----------------------------------
 
@@ -201,8 +220,23 @@ class System:
         return mixed[self.space.displacement_dofs]
 
     def pressure(self, mixed: FloatArray) -> FloatArray:
-        """Pressure of the cells from a mixed array, shape (m,), Pa."""
-        return mixed[self.space.pressure_dofs]
+        """Pressure in the middle of the cells from a mixed array, shape (m,), Pa."""
+        return self.space.cell_pressure(mixed)
+
+    def state_of(
+        self, time: float, y: FloatArray, rate: FloatArray, step: float = 0.0, iterations: int = 0
+    ) -> State:
+        """State in the body's order from the mixed arrays of y and y'."""
+        unknowns = None if self.space.nodal_only else (y.copy(), rate.copy())
+        fields = (self.displacement(y), self.displacement(rate), self.pressure(y))
+        return State(time, *fields, step, iterations, unknowns)
+
+    def vectors(self, state: State) -> tuple[FloatArray, FloatArray]:
+        """Mixed arrays of y and y' of a state; new ones."""
+        if state.unknowns is not None:
+            y, rate = state.unknowns
+            return y.copy(), rate.copy()
+        return self.mixed(state.displacement, state.pressure), self.mixed(state.velocity)
 
     def mixed(self, displacement: FloatArray, pressure: FloatArray | float = 0.0) -> FloatArray:
         """Mixed array from displacement, shape (n, 3), and pressure, shape (m,)."""
@@ -212,6 +246,10 @@ class System:
                 f"a displacement of shape {body.points.shape} is needed, not {displacement.shape}"
             )
         array = np.zeros(self.space.size)
+        if not self.space.nodal_only:
+            if np.any(displacement):
+                raise BadScene("nodal values do not determine a quadratic displacement")
+            return array  # at rest
         array[self.space.displacement_dofs] = displacement
         array[self.space.pressure_dofs] = pressure
         return array

@@ -68,10 +68,11 @@ class Dynamics:
     ----------
     scene : body, terms, supports.
     steps : step size, method, tolerances.
+    pair : displacement and pressure spaces, see `mesh.PAIRS`.
     """
 
-    def __init__(self, scene: Scene, steps: TimeSteps | None = None):
-        self.system = System(scene, dynamic=True)
+    def __init__(self, scene: Scene, steps: TimeSteps | None = None, pair: str = "Q1/P0"):
+        self.system = System(scene, dynamic=True, pair=pair)
         self.steps = steps or TimeSteps()
         self.ts = self._new_ts()
         self.newton = Newton(self.system, self.ts.getSNES(), self.steps.newton)
@@ -79,7 +80,7 @@ class Dynamics:
         self.ts.getSNES().setInitialGuess(self._predict)
         self._velocity_before: FloatArray | None = None
         self._stage_pressure_before: FloatArray | None = None
-        self._stage_pressure = np.zeros(len(scene.body.cells))
+        self._stage_pressure = np.zeros(len(self.system.space.pressure_dofs))
 
     def _new_ts(self) -> PETSc.TS:
         ts = PETSc.TS().create(PETSc.COMM_SELF)
@@ -119,7 +120,7 @@ class Dynamics:
         time_end, _ = self._set_state(ts, time, state, rate, acceleration)
         self.newton.residuals += 1
         self.system.residual(time_end, out.array_w)
-        self._stage_pressure = self.system.pressure(state.array_r)
+        self._stage_pressure = state.array_r[self.system.space.pressure_dofs]
 
     def _jacobian(self, ts, time, state, rate, acceleration, shift_v, shift_a, matrix, _) -> None:
         def assemble() -> None:
@@ -134,7 +135,7 @@ class Dynamics:
         velocity = rate.array_r
         if self._velocity_before is not None:
             velocity = 1.5 * velocity - 0.5 * self._velocity_before
-        dofs = self.system.space.displacement_dofs
+        dofs = self.system.space.all_displacement_dofs
         guess.array_w[dofs] += self.ts.getTimeStep() * velocity[dofs]
 
     # -- marching ------------------------------------------------------------------------------
@@ -171,14 +172,11 @@ class Dynamics:
 
     def rest(self, time: float = 0.0) -> State:
         """Return the reference configuration at rest."""
-        shape = self.system.scene.body.points.shape
-        return State(time, np.zeros(shape), np.zeros(shape), np.zeros(len(self._stage_pressure)))
+        zero = np.zeros(self.system.space.size)
+        return self.system.state_of(time, zero, zero)
 
     def _set_solution(self, state: State) -> None:
-        solution = PETSc.Vec().createWithArray(
-            self.system.mixed(state.displacement, state.pressure).copy()
-        )
-        rate = PETSc.Vec().createWithArray(self.system.mixed(state.velocity).copy())
+        solution, rate = (PETSc.Vec().createWithArray(x) for x in self.system.vectors(state))
         self.ts.setTime(state.time)
         self.ts.setTimeStep(self.steps.dt)
         self.ts.setSolution2(solution, rate)
@@ -280,7 +278,4 @@ class Dynamics:
             pressure = pressure + (1 - alpha_f) * (pressure - self._stage_pressure_before)
         self._stage_pressure_before = self._stage_pressure
         solution.array_w[self.system.space.pressure_dofs] = pressure
-        return State(
-            time, self.system.displacement(solution.array_r),
-            self.system.displacement(rate.array_r), pressure.copy(), dt, iterations,
-        )  # fmt: skip
+        return self.system.state_of(time, solution.array_r, rate.array_r, dt, iterations)

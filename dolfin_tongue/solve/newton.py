@@ -30,6 +30,7 @@ SNES_OPTIONS = {
     "ksp_type": "preonly",
     "pc_type": "lu",
     "pc_factor_mat_solver_type": "mumps",
+    "mat_mumps_icntl_14": 200,  # room for pivoting: a saddle point needs more than MUMPS expects
 }
 
 
@@ -98,7 +99,7 @@ class Newton:
         self._key: tuple[float, ...] = ()
         self._step_sizes: list[float] = []
         self.residuals = self.iterations = self.factorisations = 0
-        self._displacement_dofs = system.space.displacement_dofs.ravel()
+        self._displacement_dofs = system.space.all_displacement_dofs.ravel()
         snes.setConvergenceTest(self._converged)
 
     def renew(self) -> None:

@@ -26,10 +26,17 @@ class Statics:
     scene : its supports must hold the body; BadScene otherwise.
     tolerances : of Newton's method.
     time : at which activations are evaluated, s (default: when all ramps are over).
+    pair : displacement and pressure spaces, see `mesh.PAIRS`.
     """
 
-    def __init__(self, scene: Scene, tolerances: Tolerances = STATIC_TOLERANCES, time: float = 1e9):
-        self.system = System(scene, dynamic=False)
+    def __init__(
+        self,
+        scene: Scene,
+        tolerances: Tolerances = STATIC_TOLERANCES,
+        time: float = 1e9,
+        pair: str = "Q1/P0",
+    ):
+        self.system = System(scene, dynamic=False, pair=pair)
         self.time = time
         snes = PETSc.SNES().create(PETSc.COMM_SELF)
         set_options(snes, SNES_OPTIONS)
@@ -98,8 +105,4 @@ class Statics:
         return reason > 0, self.newton.snes.getIterationNumber()
 
     def _state(self, factor: float, mixed: np.ndarray, step: float, iterations: int) -> State:
-        displacement = self.system.displacement(mixed)
-        return State(
-            factor, displacement, np.zeros_like(displacement), self.system.pressure(mixed), step,
-            iterations,
-        )  # fmt: skip
+        return self.system.state_of(factor, mixed, np.zeros_like(mixed), step, iterations)
