@@ -17,6 +17,7 @@ import dolfin_tongue
 from dolfin_tongue.boundary import Gravity
 from dolfin_tongue.constitutive import (
     ActiveMuscles,
+    ConstantFibreStress,
     FibreReinforcedTissue,
     MooneyRivlin,
     ReportTissue,
@@ -36,6 +37,7 @@ TERMS = {
     "Mooney-Rivlin": MooneyRivlin(c10=800.0, c20=0.0, c01=300.0),
     "viscosity": Viscosity(40.0),
     "active": ActiveMuscles({"along": Constant(0.3), "across": Constant(0.7)}, 20e3),
+    "constant fibre": ConstantFibreStress({"across": Constant(0.7)}, 20e3),
     "gravity": Gravity((1.0, -2.0, -9.81)),
 }
 
@@ -303,6 +305,15 @@ def test_active_stress_is_tensile_along_the_fibre():
     n = along / stretch
     tau = 30e3 * 0.5 * term.law.length_factor(stretch) * 0.7  # g(0) = y0
     assert cauchy(term, F) == pytest.approx(deviator(tau * np.outer(n, n)), rel=1e-9, abs=1e-6)
+
+
+def test_constant_fibre_stress_is_what_it_says():
+    """T = T0 (F N) x (F N) / J, spherical part included."""
+    F = np.array([[0.9, 0.1, 0.0], [0.05, 1.05, 0.2], [0.0, -0.1, 1.1]])
+    along = F @ np.array(MUSCLES["across"])
+    term = ConstantFibreStress({"across": Constant(0.5)}, 30e3)
+    expected = 15e3 * np.outer(along, along) / np.linalg.det(F)
+    assert cauchy(term, F) == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
 def test_static_active_stress_is_that_of_a_standing_muscle():

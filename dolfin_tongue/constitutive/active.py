@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import exp, log
@@ -87,28 +88,25 @@ class StressMobilisation:
 
 
 @dataclass(frozen=True)
-class ActiveMuscles(Term):
-    """Active stress of muscles under given activations (31)-(34), (73).
-
-    S = sum_m tau_m J / stretch^2 N x N, made deviatoric by (36), with
-    tau = max_stress density activation f(stretch) g(stretch rate).
+class FibreStress(Term):
+    """Base of the stresses along muscle fibres under given activations.
 
     Parameters
     ----------
     activation : activation over time of each muscle that takes part, values in [0, 1]. Muscles of
         the body that are not named take no part and cost nothing.
-    max_stress : Cauchy stress at full activation, optimal length and fast lengthening, Pa.
-    law : the two factors f and g.
+    max_stress : stress at full activation, Pa; which measure, the subclass says.
     """
 
     activation: Mapping[str, Control]
     max_stress: float = SPECIFIC_TENSION
-    law: StressMobilisation = field(default_factory=StressMobilisation)
 
     def __post_init__(self) -> None:
         require_positive(self, "Pa", max_stress=self.max_stress)
         if not self.activation:
-            raise BadScene("ActiveMuscles without muscles: leave the term out of the scene instead")
+            raise BadScene(
+                f"{type(self).__name__} without muscles: leave the term out of the scene instead"
+            )
 
     def check(self, body: Body) -> None:
         """Raise UnknownName for a muscle that the body does not have."""
@@ -135,7 +133,7 @@ class ActiveMuscles(Term):
         return tuple(t for control in self.activation.values() for t in control.jumps)
 
     def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form:
-        """Integral of F S_dev : grad w, with one summand per slot, not per muscle (34)-(36)."""
+        """Integral of P : grad w, with one summand per slot, not per muscle."""
         slots = fields.body.fibres.slots(self.names, len(fields.body.cells))
         fibres = fields.on_cells(slots.directions.reshape(len(slots.directions), -1))
         level = fields.varying_on_cells(lambda t: slots.level(self.activations(t)))
@@ -143,13 +141,40 @@ class ActiveMuscles(Term):
         for slot in range(slots.count):
             fibre = ufl.as_vector([fibres[3 * slot + i] for i in range(3)])
             share = level[slot] if slots.count > 1 else level
-            stress += self.slot_stress(kin, fibre, share)
+            tension = kin.loaded(kin.number(self.max_stress) * share)
+            stress += self.slot_stress(kin, fibre, tension)
         return kin.power(stress, test)
 
-    def slot_stress(self, kin: Kinematics, fibre: Expr, level: Expr) -> Expr:
-        """First Piola-Kirchhoff stress F S_dev of one slot, Pa."""
+    @abstractmethod
+    def slot_stress(self, kin: Kinematics, fibre: Expr, tension: Expr) -> Expr:
+        """First Piola-Kirchhoff stress (Pa) of one slot.
+
+        Parameters
+        ----------
+        kin : the motion.
+        fibre : unit vector N.
+        tension : max_stress times density times activation, Pa.
+        """
+
+
+@dataclass(frozen=True)
+class ActiveMuscles(FibreStress):
+    """Active stress of muscles (31)-(34), (73).
+
+    S = sum_m tau_m J / stretch^2 N x N, made deviatoric by (36), with
+    tau = max_stress density activation f(stretch) g(stretch rate). `max_stress` is the Cauchy
+    stress at full activation, optimal length and fast lengthening.
+
+    Parameters
+    ----------
+    law : the two factors f and g.
+    """
+
+    law: StressMobilisation = field(default_factory=StressMobilisation)
+
+    def slot_stress(self, kin: Kinematics, fibre: Expr, tension: Expr) -> Expr:
+        """First Piola-Kirchhoff stress F S_dev of one slot, Pa (34), (36)."""
         stretch = kin.stretch(fibre)
-        tension = kin.loaded(kin.number(self.max_stress) * level)
         tension *= self.law.length_factor(stretch, kin.number, ufl.exp)
         if kin.static:
             tension *= kin.number(exp(self.law.rate_offset) / (1 + exp(self.law.rate_offset)))
@@ -159,3 +184,17 @@ class ActiveMuscles(Term):
         # F (N x N - (N.C N)/3 C^-1) = FN x N - stretch^2/3 F^-T, times J tau / stretch^2.
         along = ufl.outer(kin.F * fibre, fibre) / stretch**2
         return kin.J * tension * (along - ufl.inv(kin.F).T / 3)
+
+
+@dataclass(frozen=True)
+class ConstantFibreStress(FibreStress):
+    """Constant second Piola-Kirchhoff stress along the fibres, S = T N x N with its spherical part.
+
+    The active law of other programs (FEBio's prescribed active contraction), for comparisons:
+    T = max_stress density activation depends neither on the stretch nor on its rate, and the Cauchy
+    stress T stretch^2 n x n grows with the stretch.
+    """
+
+    def slot_stress(self, kin: Kinematics, fibre: Expr, tension: Expr) -> Expr:
+        """First Piola-Kirchhoff stress T (F N) x N of one slot, Pa."""
+        return tension * ufl.outer(kin.F * fibre, fibre)
