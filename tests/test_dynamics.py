@@ -52,6 +52,19 @@ def test_order_two_in_displacement_and_velocity():
     assert errors["displacement"][-1] < 1e-3
 
 
+def test_backward_euler_is_of_order_one():
+    scene = muscle_scene(SmoothRamp(0.5, 0.0, 0.08))
+    end = 0.08
+    _, reference = history(scene, TimeSteps(2.5e-4, newton=TIGHT), end)
+    errors = []
+    for ratio in (16, 8, 4):
+        steps = TimeSteps(ratio * 2.5e-4, method="backward_euler", newton=TIGHT)
+        _, coarse = history(scene, steps, end)
+        errors.append(np.abs(coarse["displacement"] - reference["displacement"][::ratio]).max())
+    ratios = np.array(errors[:-1]) / np.array(errors[1:])
+    assert ((ratios > 1.7) & (ratios < 2.3)).all()
+
+
 def test_energy_balance_closes_with_order_two():
     """Balance error over exchanged energy: below 1e-3 at 1.25 ms, a quarter at half the step."""
     scene = muscle_scene(SmoothRamp(0.5, 0.01, 0.08), Gravity())
@@ -201,6 +214,8 @@ def test_bad_steps_are_refused(bad):
         TimeSteps(**bad)
     with pytest.raises(OutOfRange, match="spectral_radius"):
         TimeSteps(spectral_radius=1.1)
+    with pytest.raises(OutOfRange, match="one of generalised_alpha, backward_euler"):
+        TimeSteps(method="leapfrog")
     with pytest.raises(OutOfRange, match="tolerance"):
         TimeSteps(tolerance=-1.0)
 

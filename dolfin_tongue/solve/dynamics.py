@@ -26,6 +26,18 @@ from dolfin_tongue.system import System
 from dolfin_tongue.term import require_positive
 
 
+#: Time-stepping methods and the options of TS that choose them, besides the spectral radius.
+METHODS: dict[str, dict[str, float]] = {
+    "generalised_alpha": {},
+    "backward_euler": {
+        "ts_alpha_alpha_m": 1,
+        "ts_alpha_alpha_f": 1,
+        "ts_alpha_gamma": 1,
+        "ts_alpha_beta": 0.5,
+    },
+}
+
+
 @dataclass(frozen=True)
 class TimeSteps:
     """How to march in time.
@@ -33,6 +45,8 @@ class TimeSteps:
     Parameters
     ----------
     dt : step, s, > 0; with `tolerance` the first step and the unit of the limits.
+    method : ``"generalised_alpha"`` or, for comparisons, ``"backward_euler"`` (order 1, the member
+        alpha_m = alpha_f = gamma = 1, beta = 1/2 of the same family).
     spectral_radius : of the method at high frequencies, in [0, 1]; 1 keeps all energy and dies of
         it, 0 damps the most. The default 0.8 damps what dt does not resolve within some steps.
     tolerance : largest error of a nodal displacement per step, m; None keeps dt fixed.
@@ -42,6 +56,7 @@ class TimeSteps:
     """
 
     dt: float = 5e-3
+    method: str = "generalised_alpha"
     spectral_radius: float = 0.8
     tolerance: float | None = None
     largest: float | None = None
@@ -54,6 +69,13 @@ class TimeSteps:
             raise OutOfRange("TimeSteps.spectral_radius", self.spectral_radius, "in [0, 1]")
         if self.tolerance is not None:
             require_positive(self, "m", tolerance=self.tolerance)
+        if self.method not in METHODS:
+            raise OutOfRange("TimeSteps.method", self.method, f"one of {', '.join(METHODS)}")
+
+    @property
+    def stage(self) -> float:
+        """Fraction of a step at which its stage stands, alpha_f."""
+        return 1.0 if self.method == "backward_euler" else 1 / (1 + self.spectral_radius)
 
     @property
     def step_limits(self) -> tuple[float, float]:
@@ -92,7 +114,7 @@ class Dynamics:
         ts.setMaxStepRejections(0)  # a failed step comes back to us; see `_advance`
         ts.setErrorIfStepFails(False)
         method = {"ts_alpha_radius": self.steps.spectral_radius, "ts_adapt_type": "none"}
-        set_options(ts, method | SNES_OPTIONS)
+        set_options(ts, method | METHODS[self.steps.method] | SNES_OPTIONS)
         return ts
 
     # -- callbacks of PETSc --------------------------------------------------------------------
@@ -272,10 +294,9 @@ class Dynamics:
     def _accepted(self, time: float, dt: float, iterations: int) -> State:
         """State at the end of a step, with the pressure extrapolated from the stages."""
         solution, rate = self.ts.getSolution2()
-        alpha_f = 1 / (1 + self.steps.spectral_radius)
         pressure: FloatArray = self._stage_pressure
         if self._stage_pressure_before is not None:
-            pressure = pressure + (1 - alpha_f) * (pressure - self._stage_pressure_before)
+            pressure = pressure + (1 - self.steps.stage) * (pressure - self._stage_pressure_before)
         self._stage_pressure_before = self._stage_pressure
         solution.array_w[self.system.space.pressure_dofs] = pressure
         return self.system.state_of(time, solution.array_r, rate.array_r, dt, iterations)

@@ -1,0 +1,1 @@
+"""Parts of the stability benchmark: outcomes, extreme scenes, other programs' results, the map."""
