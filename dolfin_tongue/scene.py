@@ -11,6 +11,9 @@ from dolfin_tongue.body import Body
 from dolfin_tongue.errors import BadScene, listing
 from dolfin_tongue.term import Support, Term
 
+#: Break points closer than this are one, s.
+SAME_TIME = 1e-9
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -58,13 +61,16 @@ class Scene:
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
-        """Times (s) at which some term is not smooth, increasing."""
-        return tuple(sorted({t for term in self.terms for t in term.breakpoints}))
+        """Times (s) at which some term is not smooth, increasing; round-off makes no two of one."""
+        times = sorted({t for term in self.terms for t in term.breakpoints})
+        following = [*times[1:], np.inf]
+        return tuple(t for t, after in zip(times, following, strict=True) if after - t > SAME_TIME)
 
     @property
     def jumps(self) -> tuple[float, ...]:
-        """Times (s) at which some term jumps, increasing."""
-        return tuple(sorted({t for term in self.terms for t in term.jumps}))
+        """Those of the break points at which some term jumps."""
+        jumps = [t for term in self.terms for t in term.jumps]
+        return tuple(t for t in self.breakpoints if any(abs(t - j) <= SAME_TIME for j in jumps))
 
     def check_volumes(self) -> None:
         """Raise BadScene for cells without a free node: their pressure would be undetermined."""

@@ -136,6 +136,17 @@ def test_steps_end_at_break_points_and_at_the_end():
     assert (np.diff(times) <= 5e-3 * (1 + 1e-12)).all() and (np.diff(times) > 1e-4).all()
 
 
+def test_break_points_that_differ_by_round_off_are_one():
+    """0.05 + 0.1 is not 0.15 in floating point; a step of 3e-17 s would end the run."""
+    body = block_body((0.04, 0.02, 0.02), (3, 2, 2), muscles={"a": (1, 0, 0), "b": (0, 1, 0)})
+    controls = {"a": Ramp(0.3, 0.05, 0.1), "b": Ramp(0.2, 0.15, 0.1)}
+    assert 0.05 + 0.1 != 0.15
+    scene = Scene(body, (ReportTissue(), ActiveMuscles(controls, 1e4)), (Attached("x0"),))
+    assert len(scene.breakpoints) == 3
+    times = [state.time for state in Dynamics(scene, TimeSteps(0.01)).march(0.2)]
+    assert len(times) == 21
+
+
 def test_lagged_and_full_newton_agree():
     scene = muscle_scene(Step(0.6, 0.01), Gravity())
     runs = []

@@ -3,7 +3,8 @@
 The pressure p is positive in compression. It enters the first Piola-Kirchhoff stress as
 -p J F^-T, and its test function q weighs the relative volume change J - 1. Both derive from the
 potential -int p (J - 1): the pair below is symmetric. With q constant per cell the condition is the
-report's: every element keeps its volume (53), (91); its Lagrange multiplier is -p.
+report's: every element keeps its volume (53), (91). In (55), where lambda times the gradient of the
+volume is a force on the nodes, the Lagrange multiplier lambda is +p.
 """
 
 from __future__ import annotations

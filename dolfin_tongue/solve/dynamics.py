@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.errors import NotConverged, OutOfRange
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene import SAME_TIME, Scene
 from dolfin_tongue.solve.failure import where_and_why
 from dolfin_tongue.solve.newton import SNES_OPTIONS, Newton, Tolerances, reason_name, set_options
 from dolfin_tongue.state import State
@@ -184,7 +184,8 @@ class Dynamics:
         self._set_solution(state)
         yield state
         jumps = self.system.scene.jumps
-        inner = [t for t in self.system.scene.breakpoints if state.time < t < end]
+        first, last = state.time + SAME_TIME, end - SAME_TIME
+        inner = [t for t in self.system.scene.breakpoints if first < t < last]
         for segment_start, segment_end in pairwise([state.time, *inner, end]):
             if segment_start in jumps:
                 self._restart()

@@ -1,0 +1,53 @@
+"""Momentum and energy of a motion: what a free, undamped body must keep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.direct.model import Model
+from dolfin_tongue.state import State
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Largest change since the first state of a motion, relative.
+
+    Parameters
+    ----------
+    momentum : over sum_K m_K |v_K| of the first state.
+    angular_momentum : likewise, with the distance to the centre of mass as lever.
+    energy : kinetic, stored and potential energy, over the first kinetic energy.
+    """
+
+    momentum: float
+    angular_momentum: float
+    energy: float
+
+
+def momentum(model: Model, state: State) -> tuple[FloatArray, FloatArray]:
+    """Momentum, N s, and angular momentum about the origin, N m s; each of shape (3,)."""
+    nodal = model.mass @ state.velocity
+    position = model.mesh.points + state.displacement
+    return nodal.sum(axis=0), np.cross(position, nodal).sum(axis=0)
+
+
+def drift(model: Model, states: Iterable[State]) -> Drift:
+    """How far momentum, angular momentum and energy leave their first values."""
+    states = list(states)
+    first = states[0]
+    nodal = np.linalg.norm(model.mass @ first.velocity, axis=1)
+    mass = np.asarray(model.mass.sum(axis=1)).ravel()
+    lever = np.linalg.norm(model.mesh.points - mass @ model.mesh.points / mass.sum(), axis=1)
+    kinetic = 0.5 * float(np.sum(first.velocity * (model.mass @ first.velocity)))
+    pairs = [momentum(model, s) for s in states]
+    linear, angular = (np.array(part) for part in zip(*pairs, strict=True))
+    energy = np.array([model.energy(s.displacement, s.velocity) for s in states])
+    return Drift(
+        float(np.linalg.norm(linear - linear[0], axis=1).max() / nodal.sum()),
+        float(np.linalg.norm(angular - angular[0], axis=1).max() / (nodal @ lever)),
+        float(np.abs(energy - energy[0]).max() / kinetic),
+    )

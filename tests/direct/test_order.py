@@ -1,0 +1,221 @@
+"""Orders of the methods, measured against a tight reference; break points and adapted steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cases import Shaken, distorted_element, mixed_mesh, random_state, relative, uniform_fibres
+
+from dolfin_tongue.boundary import Attached, Gravity
+from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
+from dolfin_tongue.control import Ramp, SmoothRamp, Step
+from dolfin_tongue.direct import (
+    Adaptive,
+    Direct,
+    Implicit,
+    Mesh,
+    Problem,
+    RungeKutta4,
+    integrate,
+)
+from dolfin_tongue.direct.implicit import Motion
+from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.geometry.simple import block_body
+from dolfin_tongue.scene import Scene
+from dolfin_tongue.state import State
+
+END = 0.03
+
+
+def bending(control=None, eta: float = 5.0) -> Scene:
+    """Block that an oblique muscle bends."""
+    body = block_body((0.03, 0.01, 0.01), (3, 1, 1), muscles={"pull": (1.0, 0.4, 0.2)})
+    # A weak muscle: the force-velocity slope of a strong one is a damping that throttles
+    # explicit steps more than any viscosity.
+    muscle = ActiveMuscles({"pull": control or SmoothRamp(0.8, 0.0, 2 * END)}, max_stress=5e3)
+    return Scene(body, (ReportTissue(), Viscosity(eta), muscle, Gravity()), (Attached("x0"),))
+
+
+def final(scene: Scene, method, end: float = END) -> State:
+    """Last state of a march."""
+    *_, state = Direct(scene, method).march(end)
+    return state
+
+
+def errors(state: State, reference: State) -> np.ndarray:
+    """Relative errors of displacement, velocity and pressure."""
+    return np.array(
+        [
+            relative(getattr(state, name), getattr(reference, name))
+            for name in ("displacement", "velocity", "pressure")
+        ]
+    )
+
+
+def orders(scene: Scene, methods: list, reference: State) -> np.ndarray:
+    """Orders of displacement, velocity and pressure from methods with halved steps."""
+    error = np.array([errors(final(scene, method), reference) for method in methods])
+    return np.log2(error[:-1] / error[1:])
+
+
+@pytest.fixture(scope="module")
+def reference() -> State:
+    """Tight solution of the bending block."""
+    return final(bending(), Adaptive(1e-13, rtol=1e-12))
+
+
+def test_runge_kutta_has_order_4(reference):
+    measured = orders(bending(), [RungeKutta4(dt) for dt in (8e-4, 4e-4, 2e-4)], reference)
+    assert (measured[-1] > 3.7).all() and (measured[-1] < 4.6).all()
+
+
+@pytest.mark.parametrize("corrections", [None, 1], ids=["newton", "linearly implicit"])
+def test_implicit_method_has_order_2(reference, corrections):
+    methods = [Implicit(dt, newton=1e-12, corrections=corrections) for dt in (1e-3, 5e-4, 2.5e-4)]
+    measured = orders(bending(), methods, reference)
+    assert (measured[-1] > 1.85).all() and (measured[-1] < 2.2).all()
+
+
+@pytest.mark.parametrize(
+    ("pair", "order", "steps"),
+    [("RK45", 5, (8e-4, 4e-4, 2e-4)), ("DOP853", 8, (2e-3, 1e-3, 5e-4))],
+)
+def test_order_of_the_pairs_with_equal_steps(reference, pair, order, steps):
+    methods = [Adaptive(1e9, rtol=1e9, pair=pair, largest=dt) for dt in steps]
+    measured = orders(bending(), methods, reference)
+    assert order - 0.6 < measured[:, 0].max() < order + 1.0
+
+
+@pytest.mark.parametrize("pair", ["RK45", "DOP853"])
+def test_error_of_the_pairs_falls_with_the_tolerance(reference, pair):
+    loose, tight = (
+        errors(final(bending(), Adaptive(t, rtol=t, pair=pair)), reference)[0] for t in (1e-5, 1e-8)
+    )
+    assert tight <= loose / 50
+    assert tight <= 1e-7
+
+
+def test_jumps_and_kinks_cost_no_order():
+    for control in (Step(0.8, 0.011), Ramp(0.8, 0.011, 0.007)):
+        scene = bending(control)
+        tight = final(scene, Adaptive(1e-12, rtol=1e-11))
+        measured = orders(scene, [RungeKutta4(dt) for dt in (3e-4, 1.5e-4, 7.5e-5)], tight)
+        assert measured[-1, :2].min() > 3.5
+        methods = [Implicit(dt, newton=1e-12) for dt in (5e-4, 2.5e-4, 1.25e-4)]
+        assert orders(scene, methods, tight)[-1, :2].min() > 1.75
+
+
+def test_break_points_are_met_and_close_ones_are_one():
+    problem = Direct(bending(Step(0.8, 0.011)), Implicit()).model.problem
+    assert integrate.stops(problem, 0.0, END) == [(0.011, 0.011, True), (END, END, False)]
+    twice = bending(Ramp(0.2, 0.1, 0.05))
+    late = ActiveMuscles({"pull": Step(0.1, 0.15)})
+    scene = Scene(twice.body, (*twice.terms, late), twice.supports)
+    assert len({0.1 + 0.05, 0.15}) == 2
+    problem = Direct(scene, Implicit()).model.problem
+    times = [stop for stop, _, _ in integrate.stops(problem, 0.0, 0.2)]
+    assert times == [0.1, 0.15, 0.2]
+    assert [jump for *_, jump in integrate.stops(problem, 0.0, 0.2)] == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    "method", [RungeKutta4(3e-4), Adaptive(1e-7), Implicit(4e-3)], ids=["rk4", "pair", "implicit"]
+)
+def test_every_method_keeps_volumes_and_meets_the_end(method):
+    solver = Direct(bending(Step(0.8, 0.011)), method)
+    states = list(solver.march(END))
+    times = [state.time for state in states]
+    assert times[0] == 0.0 and times[-1] == END and 0.011 in times
+    assert (np.diff(times) > 0).all()
+    tolerance = 1e-10 if isinstance(method, Implicit) else 1e-5
+    for state in states:
+        change, _ = solver.model.constraint(state.displacement)
+        assert np.abs(change / solver.model.rest_volumes).max() <= tolerance
+
+
+def test_a_march_goes_on_from_any_state(reference):
+    for method in (RungeKutta4(2e-4), Implicit(1e-3, newton=1e-11)):
+        whole = final(bending(), method)
+        half = final(bending(), method, END / 2)
+        *_, end = Direct(bending(), method).march(END, half)
+        bound = 1e-6 if isinstance(method, RungeKutta4) else 2 * errors(whole, reference)[0]
+        assert relative(end.displacement, whole.displacement) <= bound
+
+
+def test_adapted_steps_keep_the_tolerance(reference):
+    solver = Direct(bending(), Implicit(2e-4, tolerance=3e-7, newton=1e-10))
+    states = list(solver.march(END))
+    steps = np.array([state.step for state in states[1:]])
+    assert steps.max() > 1.5 * steps.min()
+    error = np.abs(states[-1].displacement - reference.displacement).max()
+    assert error <= len(steps) * 3e-7
+
+
+def test_supports_that_move_are_followed():
+    body = bending().body
+    scene = Scene(body, (ReportTissue(), Viscosity(5.0), Gravity()), (Shaken(),))
+    tight = final(scene, Adaptive(1e-12, rtol=1e-11))
+    held = tight.displacement[body.nodes("x0"), 2]
+    np.testing.assert_allclose(held, 1e-3 * np.sin(50 * END), rtol=1e-12)
+    assert errors(final(scene, RungeKutta4(2e-4)), tight)[:2].max() <= 1e-6
+    methods = [Implicit(dt, newton=1e-12) for dt in (1e-3, 5e-4)]
+    assert orders(scene, methods, tight)[-1].min() > 1.7
+
+
+@pytest.mark.parametrize("names", [("brick20",), ("mixed",)], ids=str)
+def test_other_elements_move_alike_with_every_method(names):
+    """Free flight under gravity with a spin: explicit and implicit agree, volumes are kept."""
+    corners = distorted_element("brick20")
+    mesh = (
+        mixed_mesh(0.1) if names == ("mixed",) else Mesh(corners, {"brick20": np.arange(20)[None]})
+    )
+    muscle = ActiveMuscles({"along": SmoothRamp(0.5, 0.0, 0.02)}, max_stress=5e3)
+    terms = (ReportTissue(), Viscosity(1.0), muscle, Gravity())
+    problem = Problem(mesh, terms, 1000.0, uniform_fibres(mesh.cell_count))
+    tight = final(problem, Adaptive(1e-12, rtol=1e-11), 0.01)
+    fall = -9.81 * 0.01**2 / 2
+    mass = Direct(problem, Implicit()).model.mass.sum(axis=1)
+    np.testing.assert_allclose(mass @ tight.displacement[:, 2] / mass.sum(), fall, rtol=1e-9)
+    last = errors(final(problem, Implicit(1e-4, newton=1e-12), 0.01), tight)
+    assert (last <= [1e-3, 1e-2, 1e-2]).all(), last
+
+
+def test_an_end_before_the_start_is_refused():
+    solver = Direct(bending(), Implicit())
+    with pytest.raises(OutOfRange, match=r"end = 0\.0"):
+        next(solver.march(0.0))
+
+
+def test_newton_s_matrix_is_the_derivative_of_the_stage():
+    """Full Newton is quadratic only with all parts of it: mass, tangents, Hessians, gradients."""
+    solver = Direct(bending(), Implicit())
+    model, stepper, step = solver.model, solver.stepper, 1e-3
+    u, pressure = random_state(model.mesh.points)[0], np.array([4e3, -2e3, 3e3])
+    still = np.zeros_like(u)
+    model.hold(0.0, u)
+
+    def momentum(v: np.ndarray, p: np.ndarray) -> np.ndarray:
+        moved = u + step * v
+        force = model.force(0.01, moved, v) - model.mass @ v / step
+        model.add_constraint_force(model.volume_gradients(moved), p, force)
+        return -force[model.free].ravel()
+
+    stepper._renew(0.01, Motion(0.01, u, still, still, pressure), step, step)
+    random = np.random.default_rng(2)
+    dv, dp = 0.1 * random.standard_normal(u.shape), 100 * random.standard_normal(3)
+    model.hold(0.0, dv)
+    rhs = momentum(1e-3 * dv, pressure + 1e-3 * dp) - momentum(-1e-3 * dv, pressure - 1e-3 * dp)
+    volume = model.constraint_rate(model.volume_gradients(u), dv)
+    velocity, found = stepper._solver(rhs / 2e-3, volume)
+    assert relative(velocity, dv[model.free].ravel()) <= 1e-7
+    assert relative(found, dp) <= 1e-6
+
+
+@pytest.mark.parametrize("patience", [0.0, 2.0, 100.0])
+def test_the_answer_does_not_depend_on_when_factors_are_renewed(patience):
+    usual = final(bending(), Implicit(2e-3, newton=1e-12))
+    other = Direct(bending(), Implicit(2e-3, newton=1e-12, patience=patience))
+    *_, state = other.march(END)
+    # Only the projection sees the age of the factors: its metric, for a drift of order dt^3.
+    assert relative(state.displacement, usual.displacement) <= 2e-4
+    assert (other.stepper.factorisations > 30) == (patience == 0.0)
