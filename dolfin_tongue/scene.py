@@ -63,8 +63,8 @@ class Scene:
     def breakpoints(self) -> tuple[float, ...]:
         """Times (s) at which some term is not smooth, increasing; round-off makes no two of one."""
         times = sorted({t for term in self.terms for t in term.breakpoints})
-        following = [*times[1:], np.inf]
-        return tuple(t for t, after in zip(times, following, strict=True) if after - t > SAME_TIME)
+        pairs = zip(times, [*times[1:], np.inf], strict=False)
+        return tuple(time for time, following in pairs if following - time > SAME_TIME)
 
     @property
     def jumps(self) -> tuple[float, ...]:
