@@ -37,7 +37,7 @@ def report_cases():
 
 
 def samples(end):
-    """Times at which motions are compared: every 4 ms."""
+    """Return the times at which motions are compared: every 4 ms."""
     return [0.004 * (k + 1) for k in range(round(end / 0.004))]
 
 

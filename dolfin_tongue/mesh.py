@@ -46,7 +46,7 @@ class Pair:
     quadrature_degree: int
 
 
-#: The pairs by name. Q1/P0 is the report's: every cell keeps its mean volume, on 2x2x2 Gauss points.
+#: The pairs by name. Q1/P0 is the report's: each cell keeps its mean volume, on 2x2x2 Gauss points.
 #: The others are inf-sup stable and show what a mesh is worth: triquadratic with discontinuous
 #: linear pressure, and Taylor-Hood on tetrahedra (each hexahedron is cut into six).
 PAIRS = {
@@ -140,7 +140,7 @@ class MixedSpace:
     def _pressure_in_the_middle(self) -> FloatArray:
         """Values of the pressure's shape functions in the middle of the master element."""
         element = self.space.sub(1).collapse()[0].element.basix_element
-        middle = basix.geometry(element.cell_type).mean(axis=0)[None]
+        middle = np.asarray(basix.geometry(element.cell_type)).mean(axis=0)[None]
         return element.tabulate(0, middle)[0, 0, :, 0]
 
     def held(self, nodes: IntArray) -> list[tuple[IntArray, IntArray]]:
@@ -166,7 +166,7 @@ class MixedSpace:
     def cells_of_stuck_pressures(self, held_dofs: IntArray) -> IntArray:
         """Cells of the body with a pressure dof around which every displacement dof is held."""
         part, to_mixed = self._displacement
-        is_free = ~np.isin(to_mixed, held_dofs).all(axis=1)
+        is_free: IntArray = np.logical_not(np.isin(to_mixed, held_dofs).all(axis=1))
         cell_is_free = is_free[part.dofmap.list].any(axis=1)
         pressures = self._pressure_of_cells
         free = np.unique(pressures[cell_is_free])
@@ -234,8 +234,6 @@ def tetrahedra(body: Body) -> IntArray:
             "tetrahedra does not fit together; use the pair Q2/P1"
         )
     return cells
-
-
 
 
 def cell_function(grid: mesh.Mesh, components: int) -> fem.Function:

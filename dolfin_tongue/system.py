@@ -25,6 +25,7 @@ from dolfin_tongue.mesh import cell_function, mixed_space, set_cell_values
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.state import State
 
+
 class CellFields:
     """Cell-wise coefficients of the terms (see `term.Fields`); those that vary follow the time."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -20,12 +20,9 @@ from dolfin_tongue.direct.model import Model, Problem, problem_of
 from dolfin_tongue.direct.multipliers import Acceleration
 from dolfin_tongue.direct.trouble import lost
 from dolfin_tongue.errors import NotConverged, OutOfRange
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene import SAME_TIME, Scene
 from dolfin_tongue.state import State
 from dolfin_tongue.term import require_positive
-
-#: Break points closer than this are one, s.
-SAME_TIME = 1e-12
 
 #: Relative volume change of a cell at which an explicit run is given up.
 LOST_VOLUME = 0.05
@@ -95,33 +92,23 @@ class Direct:
             raise OutOfRange("end", end, f"> {state.time:g} (the start)", "s")
         state = self.stepper.begin(state)
         yield state
-        for stop, last, jump in stops(self.model.problem, state.time, end):
+        for stop, jump in stops(self.model.problem, state.time, end):
             for new in self.stepper.segment(state, stop):
                 state = new
                 yield state
             if jump:
-                state = self.stepper.begin(replace(state, time=last))
+                state = self.stepper.begin(state)
 
 
-def stops(problem: Problem, start: float, end: float) -> list[tuple[float, float, bool]]:
+def stops(problem: Problem, start: float, end: float) -> list[tuple[float, bool]]:
     """List the ends of the smooth stretches between two times.
-
-    Break points that differ by round-off only (0.15 and 0.05 + 0.1) make one stop.
 
     Returns
     -------
-    list of (first break point, last one, whether one of them is a jump); the last stop is `end`.
+    list of (time, whether something jumps there); the last one is `end`.
     """
-    same = SAME_TIME * max(1.0, abs(end))
-    groups: list[list[float]] = []
-    for time in problem.breakpoints:
-        if start + same < time < end - same:
-            if groups and time - groups[-1][-1] <= same:
-                groups[-1].append(time)
-            else:
-                groups.append([time])
-    jumps = set(problem.jumps)
-    return [(g[0], g[-1], not jumps.isdisjoint(g)) for g in groups] + [(end, end, False)]
+    inner = [t for t in problem.breakpoints if start + SAME_TIME < t < end - SAME_TIME]
+    return [(time, time in problem.jumps) for time in inner] + [(end, False)]
 
 
 def before(time: float, end: float) -> float:

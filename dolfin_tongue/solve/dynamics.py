@@ -25,7 +25,6 @@ from dolfin_tongue.state import State
 from dolfin_tongue.system import System
 from dolfin_tongue.term import require_positive
 
-
 #: Time-stepping methods and the options of TS that choose them, besides the spectral radius.
 METHODS: dict[str, dict[str, float]] = {
     "generalised_alpha": {},
