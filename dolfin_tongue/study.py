@@ -29,7 +29,8 @@ def at_times(states: Iterable[State], times: Sequence[float]) -> list[State]:
     ------
     BadScene : the motion has no state at one of the times (to a millionth of a millisecond).
     """
-    wanted, found = list(times), []
+    wanted = list(times)
+    found: list[State] = []
     for state in states:
         if len(found) < len(wanted) and abs(state.time - wanted[len(found)]) <= 1e-9:
             found.append(state)
