@@ -11,7 +11,6 @@ from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.pictures import picture_shapes
 from dolfin_tongue.run import simulate
 from dolfin_tongue.scenes import report_tongue
-from dolfin_tongue.solve.dynamics import TimeSteps
 
 END = 0.8
 ACTIVATED_AT = 0.4
@@ -30,7 +29,7 @@ def main(options: Options) -> dict[str, object]:
         with progress_bar(f"{case:28}", END) as progress:
             run = simulate(
                 scene, END, options.folder / case.replace(" + ", "_"),
-                TimeSteps(options.dt or 5e-3), resume=options.resume, progress=progress,
+                options.steps(5e-3), resume=options.resume, progress=progress,
             )  # fmt: skip
         rest = min(run.frames, key=lambda frame: abs(frame.time - ACTIVATED_AT))
         shapes[case] = run.last

@@ -10,7 +10,6 @@ from dolfin_tongue.geometry.published import published_tongue
 from dolfin_tongue.pictures import picture_run
 from dolfin_tongue.run import simulate
 from dolfin_tongue.scenes import published_scene
-from dolfin_tongue.solve.dynamics import TimeSteps
 
 END = 0.5
 ACTIVATED_AT = 0.2
@@ -23,7 +22,7 @@ def main(options: Options) -> dict[str, object]:
     scene = published_scene(folder, {"GGP": Ramp(0.5, ACTIVATED_AT)}, body)
     with progress_bar("simulated", END) as progress:
         run = simulate(
-            scene, END, options.folder, TimeSteps(options.dt or 5e-3),
+            scene, END, options.folder, options.steps(5e-3),
             resume=options.resume, progress=progress,
         )  # fmt: skip
     if options.pictures:

@@ -10,7 +10,6 @@ from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.pictures import picture_run
 from dolfin_tongue.run import simulate
 from dolfin_tongue.scenes import report_tongue
-from dolfin_tongue.solve.dynamics import TimeSteps
 
 END = 1.0
 ACTIVATED_AT = 0.5
@@ -29,7 +28,7 @@ def main(options: Options) -> dict[str, object]:
     )
     with progress_bar("simulated", END) as progress:
         run = simulate(
-            scene, END, options.folder, TimeSteps(options.dt or 2.5e-3),
+            scene, END, options.folder, options.steps(2.5e-3),
             resume=options.resume, progress=progress,
         )  # fmt: skip
     if options.pictures:

@@ -40,11 +40,12 @@ def demo(
     refinement: Annotated[int, typer.Option(help="elements per edge of each of the 42")] = 1,
     pictures: Annotated[bool, typer.Option(help="draw pictures")] = True,
     resume: Annotated[bool, typer.Option("--resume", help="continue a run that stopped")] = False,
+    solver: Annotated[str, typer.Option(help="fenicsx or direct")] = "fenicsx",
 ) -> None:
     """Run a demo; its files are in RESULTS/NAME."""
     if show_list:
         return _print_table("demos", demos.available())
-    options = demos.Options(results / name, data, dt, refinement, pictures, resume)
+    options = demos.Options(results / name, data, dt, refinement, pictures, resume, solver)
     _run("demo", name, options)
 
 

@@ -12,7 +12,9 @@ from typing import Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from dolfin_tongue.direct.implicit import Implicit
 from dolfin_tongue.errors import TongueError, UnknownName
+from dolfin_tongue.solve.dynamics import TimeSteps
 
 #: Demos and benchmarks stand beside the package in a checkout, each a file with a `main`.
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -31,6 +33,7 @@ class Options:
     refinement : elements per edge of each element of the report's tongue.
     pictures : whether to draw.
     resume : continue the run that is in the folder.
+    solver : ``"fenicsx"`` or ``"direct"``.
     """
 
     folder: Path
@@ -39,6 +42,16 @@ class Options:
     refinement: int = 1
     pictures: bool = True
     resume: bool = False
+    solver: str = "fenicsx"
+
+    def __post_init__(self) -> None:
+        if self.solver not in ("fenicsx", "direct"):
+            raise UnknownName("solver", self.solver, ("fenicsx", "direct"))
+
+    def steps(self, dt: float) -> TimeSteps | Implicit:
+        """Time steps of the chosen solver: of the size asked for, or else `dt` (s)."""
+        chosen = self.dt if self.dt is not None else dt
+        return TimeSteps(chosen) if self.solver == "fenicsx" else Implicit(chosen)
 
     def need_data(self) -> Path:
         """Folder of the published tongue; TongueError says how to name it."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dolfin_tongue.direct.integrate import Direct, Method
 from dolfin_tongue.errors import NotConverged
 from dolfin_tongue.observe import EnergyAudit, volume_changes
 from dolfin_tongue.output import Recorder
@@ -17,6 +18,7 @@ from dolfin_tongue.scene import Scene
 from dolfin_tongue.shape import volume_ratios
 from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
 from dolfin_tongue.state import State
+from dolfin_tongue.system import System
 
 #: Wall time between checkpoints, s.
 CHECKPOINT_INTERVAL = 2.0
@@ -46,7 +48,7 @@ def simulate(
     scene: Scene,
     end: float,
     folder: Path,
-    steps: TimeSteps | None = None,
+    steps: TimeSteps | Method | None = None,
     *,
     frame_interval: float = 0.02,
     resume: bool = False,
@@ -59,7 +61,8 @@ def simulate(
     scene : body, terms, supports.
     end : s.
     folder : for the files; see `output.Recorder`.
-    steps : step size and method.
+    steps : step size and method: `TimeSteps` of the FEniCSx solver (default), or `Implicit`,
+        `Adaptive`, `RungeKutta4` of the direct one.
     frame_interval : time between frames, s.
     resume : continue the run that is in the folder, where there is one.
     progress : called with the time reached (s) after every step.
@@ -69,17 +72,18 @@ def simulate(
     NotConverged : after everything up to the last accepted state was written.
     """
     set_up = clock.perf_counter()
-    dynamics = Dynamics(scene, steps)
-    audit = EnergyAudit(dynamics.system)
+    solver = _solver(scene, steps)
+    system = solver.system if isinstance(solver, Dynamics) else System(scene, dynamic=True)
+    audit = EnergyAudit(system)
     recorder = Recorder(folder, scene, frame_interval)
     watch = _Watch()
     start = _resumed(recorder, audit, watch) if resume else None
     watch.set_up = clock.perf_counter() - set_up
-    status, last = "finished", start or dynamics.rest()
+    status, last = "finished", start or solver.rest()
     try:
-        for state in dynamics.march(end, start) if last.time < end else ():
+        for state in solver.march(end, start) if last.time < end else ():
             last = state
-            if state is not start:
+            if start is None or state.time > start.time:
                 _observe(state, audit, recorder, watch)
             if progress:
                 progress(state.time)
@@ -88,7 +92,7 @@ def simulate(
         raise
     finally:
         recorder.checkpoint(last, _memory(audit, watch))
-        summary = _summary(scene, dynamics, audit, watch, last, status)
+        summary = _summary(solver, audit, watch, last, status) | _described(scene)
         recorder.summary(summary)
         recorder.close()
     return Run(scene, folder, recorder.frames.read_all(), last, summary)
@@ -143,29 +147,41 @@ def _observe(state: State, audit: EnergyAudit, recorder: Recorder, watch: _Watch
     watch.observing += clock.perf_counter() - begin
 
 
+def _solver(scene: Scene, steps: TimeSteps | Method | None) -> Dynamics | Direct:
+    if steps is None or isinstance(steps, TimeSteps):
+        return Dynamics(scene, steps)
+    return Direct(scene, steps)
+
+
+def _described(scene: Scene) -> dict[str, Any]:
+    """Return what was simulated."""
+    return {
+        "cells": len(scene.body.cells),
+        "muscles": list(scene.body.fibres.names),
+        "terms": [type(term).__name__ for term in scene.terms],
+    }
+
+
 def _summary(
-    scene: Scene, dynamics: Dynamics, audit: EnergyAudit, watch: _Watch, last: State, status: str
+    solver: Dynamics | Direct, audit: EnergyAudit, watch: _Watch, last: State, status: str
 ) -> dict[str, Any]:
+    """Return what came out, and what it cost."""
     wall = clock.perf_counter() - watch.begin
     solving = wall - watch.observing
-    newton = dynamics.newton
+    newton = solver.newton if isinstance(solver, Dynamics) else None
     simulated = last.time - watch.start
     return {
         "status": status,
         "time_reached_s": last.time,
-        "cells": len(scene.body.cells),
-        "unknowns": dynamics.system.space.size,
-        "muscles": list(scene.body.fibres.names),
-        "terms": [type(term).__name__ for term in scene.terms],
-        "dt_s": dynamics.steps.dt,
-        "spectral_radius": dynamics.steps.spectral_radius,
+        "solver": "FEniCSx" if newton else "direct",
+        "method": repr(solver.steps if isinstance(solver, Dynamics) else solver.method),
         "set_up_wall_s": watch.set_up,
         "solving_wall_s": solving,
         "observing_wall_s": watch.observing,
         "simulated_seconds_per_wall_second": simulated / solving if solving > 0 else None,
-        "newton_iterations": newton.iterations,
-        "residuals": newton.residuals,
-        "factorisations": newton.factorisations,
+        "newton_iterations": newton.iterations if newton else None,
+        "residuals": newton.residuals if newton else None,
+        "factorisations": newton.factorisations if newton else None,
         "max_volume_change": watch.volume,
         "max_local_volume_change": watch.local_volume,
         "max_balance_error_J": watch.balance,

@@ -112,6 +112,18 @@ def test_demo_balance_at_its_own_step(tmp_path):
     assert numbers["largest relative volume change of a cell"] <= 1e-8
 
 
+def test_demo_with_the_direct_solver_gives_the_same_motion(tmp_path):
+    last = {}
+    for solver in ("fenicsx", "direct"):
+        folder = tmp_path / solver
+        demo.load("tongue")(demo.Options(folder, pictures=False, solver=solver))
+        summary = json.loads((folder / "summary.json").read_text())
+        assert summary["solver"].lower() == solver and summary["max_volume_change"] <= 1e-8
+        paths = np.genfromtxt(folder / "trajectories.csv", delimiter=",", names=True)
+        last[solver] = np.array([paths[f"tip_{axis}_m"] for axis in "xyz"])
+    assert np.abs(last["direct"] - last["fenicsx"]).max() < 0.02 * MM
+
+
 def test_frames_are_valid_xdmf(tmp_path, monkeypatch):
     meshio = pytest.importorskip("meshio")
     demo.load("tongue")(demo.Options(tmp_path, dt=2e-2, pictures=False))
