@@ -20,7 +20,14 @@ from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.errors import NotConverged, OutOfRange
 from dolfin_tongue.scene import SAME_TIME, Scene
 from dolfin_tongue.solve.failure import where_and_why
-from dolfin_tongue.solve.newton import SNES_OPTIONS, Newton, Tolerances, reason_name, set_options
+from dolfin_tongue.solve.newton import (
+    SNES_OPTIONS,
+    Newton,
+    Reason,
+    Tolerances,
+    reason_name,
+    set_options,
+)
 from dolfin_tongue.state import State
 from dolfin_tongue.system import System
 from dolfin_tongue.term import require_positive
@@ -254,14 +261,18 @@ class Dynamics:
     def _try_step(self) -> int:
         """One TS step; the reason of its last Newton solve."""
         self.ts.setConvergedReason(PETSc.TS.ConvergedReason.ITERATING)
-        self.ts.step()
+        try:
+            self.ts.step()
+        except PETSc.Error:  # the factorisation broke down: a smaller step has another matrix
+            return Reason.DIVERGED_LINEAR_SOLVE
         return self.ts.getSNES().getConvergedReason()
 
     def _cut(self, dt: float, error: float | None) -> float:
         """Smaller step after a failure (a quarter) or after too large an error."""
         if error is None or self.steps.tolerance is None:
             return dt / 4
-        return dt * max(0.2, 0.8 * (self.steps.tolerance / error) ** (1 / 3))
+        shorter = dt * max(0.2, 0.8 * (self.steps.tolerance / error) ** (1 / 3))
+        return max(shorter, self.steps.step_limits[0])  # at the smallest step any error is taken
 
     def _too_large(self, error: float | None, dt: float) -> bool:
         smallest, _ = self.steps.step_limits

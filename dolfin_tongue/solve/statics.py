@@ -100,7 +100,10 @@ class Statics:
         self.system.load.value = factor
         self._solution.array_w[:] = guess
         self.newton.renew()
-        self.newton.snes.solve(None, self._solution)
+        try:
+            self.newton.snes.solve(None, self._solution)
+        except PETSc.Error:  # the factorisation broke down
+            return False, self.newton.snes.getIterationNumber()
         reason = self.newton.snes.getConvergedReason()
         return reason > 0, self.newton.snes.getIterationNumber()
 
