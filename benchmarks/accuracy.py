@@ -35,7 +35,7 @@ from dolfin_tongue.shape import volume_ratios
 from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
 from dolfin_tongue.solve.newton import Tolerances
 from dolfin_tongue.solve.statics import Statics
-from dolfin_tongue.study import at_times, landmark_path, peak_memory, timed
+from dolfin_tongue.study import at_times, interpolated, landmark_path, peak_memory, timed
 from dolfin_tongue.system import System
 
 REPEATS = 3
@@ -144,7 +144,7 @@ def one_step_size(scene, make, dt, end, audit_system, reference, explicit):
     set_up = clock.perf_counter() - begin
     timing, states = timed(lambda: make(scene, dt), end, 1 if explicit else REPEATS)
     times = [SAMPLE * (k + 1) for k in range(round(end / SAMPLE))]
-    exact = explicit_states(states, times) if explicit else at_times(states, times)
+    exact = interpolated(states, times)
     nodes = [scene.body.landmark("tip"), scene.body.landmark(second_landmark(scene))]
     error = landmark_path(exact, nodes) - reference[: len(times)]
     largest = np.linalg.norm(reference, axis=2).max(axis=0)
@@ -171,16 +171,6 @@ def one_step_size(scene, make, dt, end, audit_system, reference, explicit):
         "energy_error": balance_error(audit_system, states),
         "peak_memory_MB": peak_memory() / 1e6,
     }
-
-
-def explicit_states(states, times):
-    """States of a method that chooses its steps, interpolated by the cubic path of each step."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    t = [s.time for s in states]
-    u, v = (np.array([getattr(s, name) for s in states]) for name in ("displacement", "velocity"))
-    path = CubicHermiteSpline(t, u, v)(times)
-    return [replace(states[-1], time=x, displacement=d) for x, d in zip(times, path, strict=True)]
 
 
 def balance_error(system, states):

@@ -5,10 +5,11 @@ from __future__ import annotations
 import resource
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.errors import BadScene
@@ -46,6 +47,18 @@ def visiting(solver: Solver, times: Sequence[float]) -> list[State]:
         *_, state = solver.march(time, state)
         states.append(state)
     return states
+
+
+def interpolated(states: Sequence[State], times: Sequence[float]) -> list[State]:
+    """Motion at given times on the cubic path of each step (displacement only changes).
+
+    Where a step ends at a time, that is its state; methods that choose their own steps, or had to
+    cut one, are read in between, with an error of order 4.
+    """
+    t = [state.time for state in states]
+    u, v = (np.array([getattr(s, name) for s in states]) for name in ("displacement", "velocity"))
+    path = CubicHermiteSpline(t, u, v)(times)
+    return [replace(states[-1], time=x, displacement=d) for x, d in zip(times, path, strict=True)]
 
 
 @dataclass(frozen=True)
