@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import inf, nextafter
 from typing import Any
 
+import basix
 import basix.ufl
 import numpy as np
 import ufl
@@ -23,6 +24,20 @@ from dolfin_tongue.term import Term
 def volume_changes(body: Body, displacement: FloatArray) -> FloatArray:
     """Relative volume change of every cell, shape (m,), from the node positions alone."""
     return gauss_jacobians(body.points + displacement, body.cells).sum(axis=1) / body.volumes - 1
+
+
+def local_volume_ratios(system: System, state: State) -> FloatArray:
+    """Det F at the quadrature points of any pair of spaces, shape (DOLFINx cells, points).
+
+    For Q1/P0 these are the values of `shape.volume_ratios`, in the order of DOLFINx' cells.
+    """
+    system.state.x.array[:] = system.vectors(state)[0]
+    grid = system.space.mesh
+    cell = basix.CellType[grid.topology.cell_name()]
+    points, _ = basix.make_quadrature(cell, system.space.pair.quadrature_degree)
+    jacobian = ufl.det(ufl.Identity(3) + ufl.grad(ufl.split(system.state)[0]))
+    cells = np.arange(len(system.space.parents), dtype=np.int32)
+    return fem.Expression(jacobian, points).eval(grid, cells)
 
 
 def landmark_positions(body: Body, state: State) -> dict[str, FloatArray]:

@@ -367,6 +367,19 @@ def test_volume_rows_are_the_volume_changes():
     assert change == pytest.approx(expected, rel=1e-10, abs=1e-13)
 
 
+def test_det_f_by_ufl_is_that_of_the_node_positions():
+    from dolfin_tongue.observe import local_volume_ratios
+    from dolfin_tongue.shape import volume_ratios
+
+    system = system_of("report")
+    y, v, _ = random_states(system)
+    state = system.state_of(0.0, y, v)
+    body = system.scene.body
+    expected = volume_ratios(body.points, state.displacement, body.cells)
+    ratios = local_volume_ratios(system, state)
+    assert np.sort(ratios.ravel()) == pytest.approx(np.sort(expected.ravel()), rel=1e-10)
+
+
 def test_inertia_is_the_consistent_mass():
     """M a for a constant acceleration sums up to the mass of the body (40)."""
     system = system_of("report")
