@@ -81,8 +81,8 @@ def _print_table(title: str, rows: Mapping[str, Any]) -> None:
     for name, value in rows.items():
         values = value.values() if isinstance(value, Mapping) else [value]
         table.add_row(str(name), *(_text(x) for x in values))
-    # a pipe has no width: 120 columns, so that nothing is folded in a log
-    console = Console() if sys.stdout.isatty() else Console(width=120)
+    # a pipe has no width: wide enough that nothing is folded in a log
+    console = Console() if sys.stdout.isatty() else Console(width=140)
     console.print(table)
 
 
