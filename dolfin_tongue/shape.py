@@ -66,6 +66,14 @@ def volume_ratios(points: FloatArray, displacement: FloatArray, cells: IntArray)
     return gauss_jacobians(points + displacement, cells) / gauss_jacobians(points, cells)
 
 
+def largest_stretches(points: FloatArray, displacement: FloatArray, cells: IntArray) -> FloatArray:
+    """Largest principal stretch at the 2x2x2 Gauss points of every cell, shape (m,)."""
+    xi = CORNERS / np.sqrt(3.0)
+    deformed, reference = (_jacobians(x, cells, xi) for x in (points + displacement, points))
+    gradient = deformed @ np.linalg.inv(reference)
+    return np.linalg.norm(gradient, ord=2, axis=(-2, -1)).max(axis=1)
+
+
 def corner_jacobians(points: FloatArray, cells: IntArray) -> FloatArray:
     """Scaled Jacobians at the corners: determinant over the product of the three edge lengths.
 

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.errors import NotConverged, OutOfRange
 from dolfin_tongue.scene import SAME_TIME, Scene
+from dolfin_tongue.shape import volume_ratios
 from dolfin_tongue.solve.failure import where_and_why
 from dolfin_tongue.solve.newton import (
     SNES_OPTIONS,
@@ -42,6 +43,14 @@ METHODS: dict[str, dict[str, float]] = {
         "ts_alpha_beta": 0.5,
     },
 }
+
+
+#: Reason of a step whose end has an inverted cell, beside those of PETSc.
+INVERTED = -1000
+
+
+def _name(reason: int) -> str:
+    return "INVERTED_CELL" if reason == INVERTED else reason_name(reason)
 
 
 @dataclass(frozen=True)
@@ -239,6 +248,7 @@ class Dynamics:
         """Take one step of at most dt, cutting it where Newton fails or the error is too large."""
         iterations = self.newton.iterations
         begin = self._snapshot()
+        rolled_back = False
         while True:
             self.ts.setTimeStep(dt)
             before = self.ts.getTime()
@@ -250,9 +260,10 @@ class Dynamics:
             if dt < self.steps.step_limits[0]:
                 body = self.system.scene.body
                 raise NotConverged(
-                    reason_name(reason), state.time, where_and_why(body, state.displacement)
+                    _name(reason), state.time, where_and_why(body, state.displacement)
                 )
-            self._restore(begin, before)
+            self._restore(begin, before, rolled_back)
+            rolled_back = True
         time = end if abs(self.ts.getTime() - end) <= 1e-9 * dt else self.ts.getTime()
         self.ts.setTime(time)
         self._velocity_before = begin[1]
@@ -265,7 +276,14 @@ class Dynamics:
             self.ts.step()
         except PETSc.Error:  # the factorisation broke down: a smaller step has another matrix
             return Reason.DIVERGED_LINEAR_SOLVE
-        return self.ts.getSNES().getConvergedReason()
+        reason = self.ts.getSNES().getConvergedReason()
+        return INVERTED if reason > 0 and self._inverted() else reason
+
+    def _inverted(self) -> bool:
+        """Whether a cell is inverted at the end of the step, beyond the stage that was solved."""
+        solution, _ = self.ts.getSolution2()
+        body, displacement = self.system.scene.body, self.system.displacement(solution.array_r)
+        return not (volume_ratios(body.points, displacement, body.cells) > 0).all()
 
     def _cut(self, dt: float, error: float | None) -> float:
         """Smaller step after a failure (a quarter) or after too large an error."""
@@ -295,12 +313,21 @@ class Dynamics:
         solution, rate = self.ts.getSolution2()
         return solution.array_r.copy(), rate.array_r.copy()
 
-    def _restore(self, begin: tuple[FloatArray, FloatArray], time: float) -> None:
-        """Return to the begin of a step that failed."""
+    def _restore(
+        self, begin: tuple[FloatArray, FloatArray], time: float, rolled_back: bool
+    ) -> None:
+        """Return to the begin of a step that failed, with the acceleration that was there.
+
+        TS keeps that for the next try if it was told to roll back; a try that fails does not undo
+        the telling. An acceleration estimated anew would add the velocity's error across the
+        volume condition over and over, until repeated cuts let the velocities grow as 1/dt.
+        """
+        if not rolled_back:
+            self.ts.rollBack()
         solution, rate = self.ts.getSolution2()
         solution.array_w[:], rate.array_w[:] = begin
         self.ts.setTime(time)
-        self._restart()
+        self.newton.renew()
 
     def _accepted(self, time: float, dt: float, iterations: int) -> State:
         """State at the end of a step, with the pressure extrapolated from the stages."""

@@ -7,7 +7,10 @@ import numpy as np
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import listing
-from dolfin_tongue.shape import volume_ratios
+from dolfin_tongue.shape import largest_stretches, volume_ratios
+
+#: Stretch beyond which exponential tissue may be too steep for a step, or overflow.
+VERY_LONG = 1.6
 
 
 def where_and_why(body: Body, displacement: FloatArray) -> str:
@@ -15,8 +18,15 @@ def where_and_why(body: Body, displacement: FloatArray) -> str:
     ratios = volume_ratios(body.points, displacement, body.cells).min(axis=1)
     worst = np.argsort(ratios)[:5]
     cells = listing(f"{cell} (smallest det F {ratios[cell]:.3f})" for cell in worst)
+    stretch = largest_stretches(body.points, displacement, body.cells)
+    longest = int(stretch.argmax())
     if ratios.min() < 0.3:
         cause = "cells are close to inversion: lower the activation or refine the mesh there"
+    elif stretch[longest] > VERY_LONG:
+        cause = (
+            f"cell {longest} is stretched {stretch[longest]:.2f} times, where exponential tissue "
+            "is steep and may overflow: lower the load or take a smaller dt"
+        )
     else:
         cause = (
             "no cell is near inversion: try a smaller dt, a slower ramp of the activations or some "
