@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.errors import NotConverged, OutOfRange
 from dolfin_tongue.scene import SAME_TIME, Scene
-from dolfin_tongue.shape import volume_ratios
+from dolfin_tongue.shape import gauss_jacobians
 from dolfin_tongue.solve.failure import where_and_why
 from dolfin_tongue.solve.newton import (
     SNES_OPTIONS,
@@ -283,7 +283,7 @@ class Dynamics:
         """Whether a cell is inverted at the end of the step, beyond the stage that was solved."""
         solution, _ = self.ts.getSolution2()
         body, displacement = self.system.scene.body, self.system.displacement(solution.array_r)
-        return not (volume_ratios(body.points, displacement, body.cells) > 0).all()
+        return not (gauss_jacobians(body.points + displacement, body.cells) > 0).all()
 
     def _cut(self, dt: float, error: float | None) -> float:
         """Smaller step after a failure (a quarter) or after too large an error."""
