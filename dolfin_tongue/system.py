@@ -196,6 +196,8 @@ class System:
         """Prescribed displacement of the held dofs, shape (number of points, 3), m."""
         supports = zip(self.scene.supports, self._held_points, strict=True)
         nodes = np.concatenate([support.displacement(x, time) for support, x in supports])
+        if self.space.nodal_only:
+            return nodes
         return np.concatenate([nodes[corners].mean(axis=1) for corners in self._held_corners])
 
     def volume_change(self, residual: FloatArray) -> FloatArray:
