@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import time as clock
+import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -66,22 +67,28 @@ class Outcome:
     @property
     def short(self) -> str:
         """Outcome in a few words, with the cause where there is one."""
-        return f"{self.kind}: {short_cause(self.cause)}" if self.cause else self.kind
+        if self.kind in ("finished", "drifted"):
+            kept = "" if self.kind == "finished" else " (not kept)"
+            return f"finished, dV {self.volume:.0e}{kept}"
+        at = "" if self.kind == "refused" else f" at {self.time:.4g} s"
+        return f"{self.kind}{at}: {short_cause(self.cause)}"
 
 
 def short_cause(text: str) -> str:
     """Cut the list of cells and the advice out of a message."""
-    text = text.partition(" Most distorted cells")[0] + _advice(text)
+    found = re.search(r"stability limit, which (.*?)( \(fastest [^)]*\))? sets to (\S+)", text)
+    if found:
+        return f"{found.group(1)} allows {1e3 * float(found.group(3)):.3g} ms"
+    text = text.partition(" Most distorted cells")[0].rstrip(".") + _advice(text)
     found = re.search(r"Cause: (.*)$", text)
     text = found.group(1) if found else re.sub(r"^no convergence beyond t = \S+ ", "", text)
-    found = re.search(r"the stability limit of (\S+) s, set by (.*?)(;|$| \(fastest)", text)
-    return f"limit {found.group(1)} s by {found.group(2)}" if found else text.strip().rstrip(".;")
+    return re.sub(r": (lower|try) .*$", "", text).strip().rstrip(".;")
 
 
 def _advice(text: str) -> str:
     """Cause that a FEniCSx run names after its list of cells, up to the colon."""
     found = re.search(r"det F [^;]*; ([^:]*)(: |$)", text)
-    return f" {found.group(1)}" if found else ""
+    return f"; {found.group(1)}" if found else ""
 
 
 def attempt_alpha2(
@@ -110,10 +117,16 @@ def attempt_alpha2(
     except TongueError as error:
         return Outcome("refused", cause=str(error), wall=clock.perf_counter() - begin)
     except Exception as error:  # whatever else comes is what this benchmark looks for
-        kind, cause = "fault", f"{type(error).__name__}: {error}"
+        kind, cause = "fault", _crash(error)
     outcome = _from_files(folder, kind, cause)
     outcome.wall, outcome.last = clock.perf_counter() - begin, last
     return _judged(outcome, end)
+
+
+def _crash(error: Exception) -> str:
+    """Error with the place where it was raised."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
 
 
 def _from_files(folder: Path, kind: str, cause: str) -> Outcome:
@@ -209,7 +222,7 @@ def attempt_march(
     except TongueError as error:
         kind, cause = ("stopped" if states else "refused"), str(error)
     except Exception as error:  # whatever else comes is what this benchmark looks for
-        kind, cause = "fault", f"{type(error).__name__}: {error}"
+        kind, cause = "fault", _crash(error)
     finally:
         if recorder:
             recorder.close()
@@ -221,7 +234,7 @@ def attempt_march(
 def _observed(
     solver: Any, scene: Scene, end: float, start: State | None
 ) -> Iterator[tuple[State, float, float]]:
-    """Accepted states with their volume change and their energy (0 from FEniCSx)."""
+    """March; yields accepted states with volume change and energy (0 from FEniCSx)."""
     model = getattr(solver, "model", None)
     for state in solver.march(end, start):
         volume = float(np.abs(volume_changes(scene.body, state.displacement)).max())

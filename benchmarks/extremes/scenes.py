@@ -120,9 +120,11 @@ def tongue(
     control : activation of all muscles; default none of them.
     factor : of the passive modulus.
     viscosity : Pa s.
-    gravity : m/s2, downwards.
+    gravity : m/s2, downwards; 0 for none.
     """
-    terms = [ReportTissue(500.0 * factor), Viscosity(viscosity), Gravity((0.0, 0.0, -gravity))]
+    terms = [ReportTissue(500.0 * factor), Viscosity(viscosity)]
+    if gravity:
+        terms.append(Gravity((0.0, 0.0, -gravity)))
     if control is not None:
         terms.append(ActiveMuscles(dict.fromkeys(body.fibres.names, control)))
     return Scene(body, tuple(terms), (Attached(*REPORT_ATTACHMENTS),))
@@ -134,7 +136,7 @@ def half_active() -> Control:
 
 
 def febio_dynamic(cells: tuple[int, int, int], active: bool) -> Scene:
-    """Undamped block of case C: gravity along -x, with or without 20 kPa along z."""
+    """Build the undamped block of case C: gravity along -x, with or without 20 kPa along z."""
     body = block_body(FEBIO_SIZE, cells, muscles={"across": (0.0, 0.0, 1.0)})
     terms = [MooneyRivlin(FEBIO_C1, 0.0), Gravity((-9.81, 0.0, 0.0))]
     if active:
@@ -143,7 +145,7 @@ def febio_dynamic(cells: tuple[int, int, int], active: bool) -> Scene:
 
 
 def febio_static(material: str, angle: float) -> Scene:
-    """Static block of case A: 10 kPa along fibres at an angle (degrees) to x.
+    """Build the static block of case A: 10 kPa along fibres at an angle (degrees) to x.
 
     Parameters
     ----------
