@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from dolfinx import fem
 from scipy.optimize import curve_fit, root
 from scipy.special import jv
 
+from dolfin_tongue import demo
 from dolfin_tongue.body import Body
 from dolfin_tongue.boundary import SurfaceTension
 from dolfin_tongue.constitutive import Viscosity
@@ -73,6 +75,33 @@ def test_both_solvers_find_the_same_drop():
     scene = Scene(body, (Viscosity(0.1), SurfaceTension(SIGMA)))
     other = list(Dynamics(scene, TimeSteps(5e-3)).march(0.6))[-1]
     assert excess(body, other) == pytest.approx(excess(body, settled(body)), abs=2e-4)
+
+
+@pytest.mark.parametrize(("pair", "make", "bound"), [("Q2/P1", ball, 1e-5), ("P2/P1", cube, 1e-2)])
+def test_curved_faces_make_a_rounder_drop(pair, make, bound):
+    """Richer pairs: the surface of a quadratic displacement is curved."""
+    body = make(2)
+    term = SurfaceTension(SIGMA)
+    scene = Scene(body, (Viscosity(0.5), term))
+    solver = Dynamics(scene, TimeSteps(1e-2), pair)
+    last = list(solver.march(0.6))[-1]
+    system = solver.system
+    system.state.x.array[:] = last.unknowns[0]
+    energy = term.energy(system.kinematics(system.state, system.rate), system.fields)
+    area = fem.assemble_scalar(fem.form(energy)) / SIGMA
+    assert abs(area / (4 * np.pi * radius_of(body) ** 2) - 1) <= bound
+    pressure = (last.pressure * body.volumes).sum() / body.volumes.sum()
+    assert abs(pressure * radius_of(body) / (2 * SIGMA) - 1) <= 3 * bound
+
+
+@pytest.mark.parametrize("solver", ["fenicsx", "direct"])
+def test_the_demo(tmp_path, solver):
+    options = demo.Options(tmp_path, pictures=False, solver=solver)
+    numbers = demo.load("drop")(options)
+    assert numbers["mean pressure / (2 sigma / R)"] == pytest.approx(1.012, abs=2e-3)
+    assert numbers["area / area of the sphere, at the end"] == pytest.approx(1.012, abs=1e-3)
+    assert numbers["drift of momentum, of the largest"] <= 1e-12
+    assert numbers["drift of angular momentum, of the largest"] <= 1e-12
 
 
 # -- oscillation ----------------------------------------------------------------------------------
