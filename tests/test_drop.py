@@ -224,9 +224,16 @@ def test_a_flying_drop_keeps_its_momentum(name):
     assert found.angular_momentum <= (1e-11 if name == "DOP853" else 1e-3)
 
 
-def test_spin_is_lost_with_the_square_of_the_step():
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda scene, dt: Dynamics(scene, TimeSteps(dt)),
+        lambda scene, dt: Direct(scene, Implicit(dt, newton=1e-11)),
+    ],
+    ids=["alpha2", "TR-BDF2"],
+)
+def test_spin_is_lost_with_the_square_of_the_step(make):
     losses = [
-        flight(lambda scene, dt=dt: Dynamics(scene, TimeSteps(dt)), True).angular_momentum
-        for dt in (5e-3, 2.5e-3)
+        flight(lambda scene, dt=dt: make(scene, dt), True).angular_momentum for dt in (5e-3, 2.5e-3)
     ]
     assert losses[1] <= 0.35 * losses[0]
