@@ -10,6 +10,7 @@ import numpy as np
 
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName, listing
+from dolfin_tongue.faces import BOUNDARY, check_surface, outer_faces
 from dolfin_tongue.fibres import Fibres
 from dolfin_tongue.shape import corner_jacobians, gauss_jacobians
 
@@ -31,10 +32,13 @@ class Body:
     density : mass density rho_0, kg/m3.
     fibres : the muscles.
     name : for messages and file names.
+    surfaces : named parts of the boundary, each ndarray of shape (k, 4): quadrilaterals as node
+        numbers, outward by the right-hand rule. ``"boundary"`` is always known: all outer faces.
 
     Raises
     ------
-    BadMesh : wrong shapes, NaN coordinates, cells that name missing nodes, inverted cells (listed).
+    BadMesh : wrong shapes, NaN coordinates, cells that name missing nodes, inverted cells (listed),
+        surfaces that are empty, inside the body or point inward (listed).
     OutOfRange : density <= 0.
     """
 
@@ -45,6 +49,7 @@ class Body:
     density: float = TISSUE_DENSITY
     fibres: Fibres = field(default_factory=Fibres)
     name: str = "body"
+    surfaces: Mapping[str, IntArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.density > 0:
@@ -58,6 +63,7 @@ class Body:
                 f"point): {listing(inverted)}. Check the node order (0-3 bottom "
                 "counter-clockwise, 4-7 above) and the node coordinates"
             )
+        self._check_surfaces()
 
     def _check_arrays(self) -> None:
         if self.points.ndim != 2 or self.points.shape[1] != 3:
@@ -90,6 +96,15 @@ class Body:
             ):
                 raise BadMesh(f"{self.name}: muscle {muscle.name!r} names a cell that is not there")
 
+    def _check_surfaces(self) -> None:
+        if BOUNDARY in self.surfaces:
+            raise BadMesh(
+                f"{self.name}: the surface name {BOUNDARY!r} is taken by all outer faces; choose "
+                "another one"
+            )
+        for name, faces in self.surfaces.items():
+            check_surface(f"{self.name}: the surface {name!r}", np.asarray(faces), self.boundary)
+
     def nodes(self, region: str) -> IntArray:
         """Node numbers of a region; UnknownName lists the known ones."""
         if region not in self.node_sets:
@@ -101,6 +116,19 @@ class Body:
         if name not in self.landmarks:
             raise UnknownName("landmark", name, self.landmarks)
         return int(self.landmarks[name])
+
+    def surface(self, name: str) -> IntArray:
+        """Quadrilaterals of a surface, shape (k, 4); UnknownName lists the known ones."""
+        if name == BOUNDARY:
+            return self.boundary
+        if name not in self.surfaces:
+            raise UnknownName("surface", name, (*self.surfaces, BOUNDARY))
+        return np.asarray(self.surfaces[name], dtype=np.int64)
+
+    @cached_property
+    def boundary(self) -> IntArray:
+        """All outer faces, shape (k, 4): node numbers, outward by the right-hand rule."""
+        return outer_faces(np.asarray(self.cells, dtype=np.int64))[0]
 
     @cached_property
     def volumes(self) -> FloatArray:

@@ -73,6 +73,22 @@ class Kinematics:
         """Rate of deformation, the symmetric spatial velocity gradient, 1/s (4)."""
         return ufl.sym(ufl.grad(self.velocity) * ufl.inv(self.F))
 
+    @property
+    def normal(self) -> Expr:
+        """Outward unit normal N of the reference surface; in integrals over a surface only."""
+        return ufl.FacetNormal(self.dx.ufl_domain())
+
+    @property
+    def area_ratio(self) -> Expr:
+        """Deformed over reference area of the surface, |J F^-T N| (2); cofactors need no 1/J."""
+        image = ufl.cofac(self.F) * self.normal
+        return ufl.sqrt(ufl.inner(image, image))
+
+    @property
+    def surface_C_trace(self) -> Expr:
+        """Trace of the surface's right Cauchy-Green tensor, a^ab A_ab = tr C - N.C N (7), (8)."""
+        return ufl.tr(self.C) - ufl.inner(self.normal, self.C * self.normal)
+
     def stretch(self, fibre: Expr) -> Expr:
         """Fibre stretch sqrt(N.C N) of a unit vector N of the reference body (30)."""
         return ufl.sqrt(ufl.inner(fibre, self.C * fibre))

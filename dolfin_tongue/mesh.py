@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import basix
 import basix.ufl
@@ -17,7 +18,7 @@ from mpi4py import MPI
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import BadMesh, UnknownName
-from dolfin_tongue.shape import FACES
+from dolfin_tongue.faces import row_places
 
 #: From the brick (VTK) order of hexahedron nodes to the tensor-product order of basix.
 TENSOR_ORDER = np.array([0, 1, 3, 2, 4, 5, 7, 6])
@@ -143,6 +144,26 @@ class MixedSpace:
         middle = np.asarray(basix.geometry(element.cell_type)).mean(axis=0)[None]
         return element.tabulate(0, middle)[0, 0, :, 0]
 
+    def facets(self, faces: IntArray) -> IntArray:
+        """Facets of the mesh that lie in quadrilaterals of the body.
+
+        Parameters
+        ----------
+        faces : ndarray, shape (k, 4) -- outer faces of the body, as node numbers.
+
+        Returns
+        -------
+        ndarray, shape (f, 2) -- cell and local facet; each quadrilateral is one facet of a
+        hexahedron or two of tetrahedra.
+        """
+        local = np.array(basix.topology(basix.CellType[self.pair.shape])[2])
+        count = local.shape[1]
+        corners = np.array(list(combinations(range(4), count)))
+        wanted = np.unique(np.sort(faces[:, corners].reshape(-1, count), axis=1), axis=0)
+        nodes = np.sort(self._vertices[:, local].reshape(-1, count), axis=1)
+        number = np.flatnonzero(row_places(nodes, wanted) >= 0)
+        return np.stack([number // len(local), number % len(local)], axis=1)
+
     def held(self, nodes: IntArray) -> list[tuple[IntArray, IntArray]]:
         """Dofs that follow held nodes.
 
@@ -226,9 +247,7 @@ def tetrahedra(body: Body) -> IntArray:
     cells = body.cells[:, TETRAHEDRA].reshape(-1, 4)
     faces = np.sort(cells[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
     single = (np.unique(faces, axis=0, return_counts=True)[1] == 1).sum()
-    quads = np.sort(body.cells[:, FACES].reshape(-1, 4), axis=1)
-    outer = (np.unique(quads, axis=0, return_counts=True)[1] == 1).sum()
-    if single != 2 * outer:
+    if single != 2 * len(body.boundary):
         raise BadMesh(
             f"{body.name}: its hexahedra are not numbered alike, so that cutting them into "
             "tetrahedra does not fit together; use the pair Q2/P1"

@@ -50,7 +50,7 @@ def landmark_positions(body: Body, state: State) -> dict[str, FloatArray]:
 class EnergyAudit:
     """Energies, works and their balance over a motion.
 
-    The energies (kinetic, and one per term that has an energy density) are evaluated at accepted
+    The energies (kinetic, and one per term that has an energy) are evaluated at accepted
     states. The works are time integrals of the power that each other term gives to the motion:
     positive work was done *on* the body. They are integrated by Simpson's rule, with the cubic
     Hermite path of displacement and velocity in between, so that their own error (order 4) does not
@@ -73,14 +73,14 @@ class EnergyAudit:
         kin = system.kinematics(system.state, system.rate)
         velocity = kin.velocity
         density = system.number(system.scene.body.density)
-        parts = {"kinetic": density / 2 * ufl.inner(velocity, velocity)}
+        parts = {"kinetic": density / 2 * ufl.inner(velocity, velocity) * system.dx}
         names = _labels(terms)
         for term, name in zip(terms, names, strict=True):
-            energy = term.energy_density(kin, system.fields)
+            energy = term.energy(kin, system.fields)
             if energy is not None:
                 parts[name] = energy
         self.energy_names = tuple(parts)
-        self._energies = self._cell_integrals([value * system.dx for value in parts.values()])
+        self._energies = self._cell_integrals(list(parts.values()))
         powers = {
             name: term.virtual_power(kin, system.fields, velocity)
             for term, name in zip(terms, names, strict=True)

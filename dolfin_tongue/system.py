@@ -16,7 +16,7 @@ from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from petsc4py import PETSc
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.compile import compile_form
 from dolfin_tongue.constitutive.incompressible import pressure_power, volume_condition
 from dolfin_tongue.errors import BadScene, listing
@@ -27,11 +27,17 @@ from dolfin_tongue.state import State
 
 
 class CellFields:
-    """Cell-wise coefficients of the terms (see `term.Fields`); those that vary follow the time."""
+    """What terms borrow (see `term.Fields`): cell-wise coefficients, and measures of surfaces.
+
+    Coefficients that vary follow the time.
+    """
 
     def __init__(self, space):
         self.body = space.body
         self._space = space
+        # One list for all measures: a form takes its facets from a single place.
+        self._facets: list[tuple[int, IntArray]] = []
+        self._surfaces: dict[str, ufl.Measure] = {}
         self._varying: list[tuple[fem.Function, Callable[[float], FloatArray]]] = []
         self._time = np.nan
 
@@ -48,6 +54,18 @@ class CellFields:
         self._varying.append((function, values))
         self._time = np.nan
         return function
+
+    def surface(self, name: str) -> ufl.Measure:
+        """Measure of a named surface; its facets are looked for when it is first asked for."""
+        if name not in self._surfaces:
+            number = len(self._facets) + 1
+            facets = self._space.facets(self.body.surface(name))
+            self._facets.append((number, facets.astype(np.int32).ravel()))
+            self._surfaces[name] = ufl.Measure(
+                "ds", self._space.mesh, subdomain_id=number, subdomain_data=self._facets,
+                metadata={"quadrature_degree": self._space.pair.quadrature_degree},
+            )  # fmt: skip
+        return self._surfaces[name]
 
     def set_time(self, time: float) -> None:
         """Evaluate the varying coefficients at a time, s."""

@@ -30,6 +30,9 @@ class Fields(Protocol):
     def varying_on_cells(self, values: Callable[[float], FloatArray]) -> Expr:
         """Like `on_cells`, with values that are evaluated anew at each time t, s."""
 
+    def surface(self, name: str) -> ufl.Measure:
+        """Measure dS of a named surface of the reference body, m2; UnknownName lists them."""
+
 
 class Term(ABC):
     """Base of the terms that do (virtual) power."""
@@ -44,8 +47,8 @@ class Term(ABC):
         Returns None where the term has no part (a rate term in a static scene).
         """
 
-    def energy_density(self, kin: Kinematics, fields: Fields) -> Expr | None:
-        """Potential energy per reference volume, J/m3; None for a term without one."""
+    def energy(self, kin: Kinematics, fields: Fields) -> ufl.Form | None:
+        """Potential energy of the whole body, J; None for a term without one."""
         return None
 
     @property
@@ -60,15 +63,43 @@ class Term(ABC):
 
 
 class EnergyTerm(Term):
-    """A term that derives from an energy density; its first Piola-Kirchhoff stress is dW/dF."""
+    """A term that derives from an energy density W; its first Piola-Kirchhoff stress is dW/dF."""
 
     @abstractmethod
     def energy_density(self, kin: Kinematics, fields: Fields) -> Expr:
-        """Energy per reference volume, J/m3."""
+        """Energy per reference volume, J/m3 (of a `SurfaceTerm`: per reference area, J/m2)."""
+
+    def measure(self, kin: Kinematics, fields: Fields) -> ufl.Measure:
+        """Where the energy sits: the volume of the body."""
+        return kin.dx
+
+    def energy(self, kin: Kinematics, fields: Fields) -> ufl.Form:
+        """Integral of W, J."""
+        return self.energy_density(kin, fields) * self.measure(kin, fields)
 
     def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form:
-        """Integral of dW/dF : grad w (29), (39)."""
-        return kin.power(ufl.diff(self.energy_density(kin, fields), kin.F), test)
+        """Integral of dW/dF : grad w (29), (39): the derivative of the energy along w."""
+        stress = ufl.diff(self.energy_density(kin, fields), kin.F)
+        return ufl.inner(stress, ufl.grad(test)) * self.measure(kin, fields)
+
+
+class SurfaceTerm(EnergyTerm):
+    """An energy per reference area of a named surface of the body, W in J/m2.
+
+    W depends on the tangential part of F only, `kin.area_ratio` and `kin.surface_C_trace`, so that
+    dW/dF : grad w is the power of the membrane forces, S^ab dE_ab (14).
+    """
+
+    #: Name of the surface; a field of the dataclass.
+    surface: str
+
+    def check(self, body: Body) -> None:
+        """Refuse a surface that the body does not have."""
+        body.surface(self.surface)
+
+    def measure(self, kin: Kinematics, fields: Fields) -> ufl.Measure:
+        """Where the energy sits: the surface."""
+        return fields.surface(self.surface)
 
 
 class Support(ABC):

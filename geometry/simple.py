@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from dolfin_tongue.body import TISSUE_DENSITY, Body
 from dolfin_tongue.errors import BadMesh, OutOfRange
+from dolfin_tongue.faces import faces_between, outer_faces
 from dolfin_tongue.fibres import Fibres, FloatArray, IntArray, MuscleFibres
 from dolfin_tongue.shape import FACES
 
@@ -55,7 +56,8 @@ def block_body(
     Returns
     -------
     Body
-        Node sets ``x0, x1, y0, y1, z0, z1`` are the faces at the lower and upper end of each axis;
+        Node sets and surfaces ``x0, x1, y0, y1, z0, z1`` are the faces at the lower and upper end
+        of each axis;
         landmark ``end`` is the node of ``x1`` nearest to the centre of that face.
 
     Raises
@@ -84,7 +86,55 @@ def block_body(
             for muscle, direction in (muscles or {}).items()
         )
     )
-    return Body(points, brick_cells(counts), node_sets, {"end": end}, density, fibres, name)
+    cells_of_block = brick_cells(counts)
+    outer, _ = outer_faces(cells_of_block)
+    surfaces = {side: faces_between(outer, nodes) for side, nodes in node_sets.items()}
+    return Body(points, cells_of_block, node_sets, {"end": end}, density, fibres, name, surfaces)
+
+
+def ball_body(
+    radius: float = 0.01, cells: int = 2, *, density: float = 1000.0, name: str = "ball"
+) -> Body:
+    """Build a ball of a rounded cube and layers of hexahedra around it, all of good shape.
+
+    Parameters
+    ----------
+    radius : of the sphere on which the outer nodes lie, m.
+    cells : number of cells along each edge of the cube; half as many layers around it.
+    density : mass density, kg/m3.
+    name : name of the body.
+
+    Returns
+    -------
+    Body
+        Centred at the origin. cells = 2, 4, 6 makes 32, 256, 864 hexahedra.
+
+    Raises
+    ------
+    OutOfRange : radius <= 0 or fewer than one cell.
+    """
+    if not 0 < radius < np.inf:
+        raise OutOfRange("radius", radius, "finite and > 0", "m")
+    if int(cells) < 1:
+        raise OutOfRange("cells", cells, ">= 1")
+    line = np.tan(np.linspace(-np.pi / 4, np.pi / 4, int(cells) + 1))  # equal angles
+    cube = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1)
+    cube = cube.transpose(2, 1, 0, 3).reshape(-1, 3)
+    length = np.maximum(np.linalg.norm(cube, axis=1, keepdims=True), 1e-300)
+    round_cube = cube * np.abs(cube).max(axis=1, keepdims=True) / length
+    inner = radius * (0.25 * cube + 0.3 * round_cube)
+    blocks = [brick_cells((int(cells),) * 3)]
+    faces, _ = outer_faces(blocks[0])
+    skin = np.unique(faces)
+    count, layers = len(cube), max(1, int(cells) // 2)
+    points, below = [inner], faces
+    for layer in range(1, layers + 1):
+        share = layer / layers
+        points.append((1 - share) * inner[skin] + share * radius * (cube / length)[skin])
+        above = np.searchsorted(skin, faces) + count + (layer - 1) * len(skin)
+        blocks.append(np.concatenate([below, above], axis=1))
+        below = above
+    return Body(np.concatenate(points), np.concatenate(blocks), density=density, name=name)
 
 
 def _uniform(name: str, direction: ArrayLike, cell_count: int) -> MuscleFibres:
@@ -104,9 +154,7 @@ def surface_nodes(cells: IntArray) -> IntArray:
     ----------
     cells : ndarray, shape (m, 8).
     """
-    faces = cells[:, FACES].reshape(-1, 4)
-    distinct, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
-    return np.unique(distinct[count == 1])
+    return np.unique(outer_faces(cells)[0])
 
 
 def distort(body: Body, amplitude: float = 0.2, seed: int = 0) -> Body:

@@ -14,7 +14,7 @@ import ufl
 from dolfinx import fem
 
 import dolfin_tongue
-from dolfin_tongue.boundary import Gravity
+from dolfin_tongue.boundary import Gravity, Skin, SurfaceTension
 from dolfin_tongue.constitutive import (
     ActiveMuscles,
     ConstantFibreStress,
@@ -39,6 +39,8 @@ TERMS = {
     "active": ActiveMuscles({"along": Constant(0.3), "across": Constant(0.7)}, 20e3),
     "constant fibre": ConstantFibreStress({"across": Constant(0.7)}, 20e3),
     "gravity": Gravity((1.0, -2.0, -9.81)),
+    "surface tension": SurfaceTension(3.0, surface="x1"),
+    "skin": Skin(20e3, 1e-3),
 }
 
 
@@ -112,8 +114,7 @@ def test_force_is_the_gradient_of_the_energy(name):
     y[system.space.pressure_dofs] = 0.0
     d = system.mixed(np.random.default_rng(6).standard_normal(system.scene.body.points.shape))
     kin = system.kinematics(system.state, system.rate)
-    density = TERMS[name].energy_density(kin, system.fields)
-    form = fem.form(density * system.dx)
+    form = fem.form(TERMS[name].energy(kin, system.fields))
 
     def energy(e):
         system.state.x.array[:] = y + e * d

@@ -8,7 +8,7 @@ import numpy as np
 
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.boundary import Attached, Gravity
+from dolfin_tongue.boundary import Attached, Gravity, SurfaceTension
 from dolfin_tongue.constitutive import (
     ActiveMuscles,
     ConstantFibreStress,
@@ -88,6 +88,26 @@ def _quality(body: Body, inside: IntArray, distance: float) -> float:
         return float(replace(body, points=points).scaled_jacobians.min())
     except ValueError:
         return -1.0
+
+
+def film_on_a_corner(sigma: float, quality: float = 0.05, viscosity: float = 1.0) -> Scene:
+    """Free block of liquid under surface tension, one of whose corner cells is nearly inverted.
+
+    Parameters
+    ----------
+    sigma : N/m.
+    quality : scaled Jacobian of the worst cell: the corner node is pushed into its cell.
+    viscosity : Pa s.
+    """
+    body = block_body((0.02, 0.02, 0.02), (2, 2, 2), density=1000.0)
+    corner = np.array([len(body.points) - 1])
+    low, high = 0.0, -0.0099
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _quality(body, corner, middle) > quality else (low, middle)
+    points = body.points.copy()
+    points[corner] += low
+    return Scene(replace(body, points=points), (Viscosity(viscosity), SurfaceTension(sigma)))
 
 
 def driven_block(distance: float, duration: float = 0.1) -> Scene:

@@ -2,5 +2,7 @@
 
 from dolfin_tongue.boundary.attached import Attached
 from dolfin_tongue.boundary.gravity import STANDARD_GRAVITY, Gravity
+from dolfin_tongue.boundary.skin import Skin
+from dolfin_tongue.boundary.surface_tension import SurfaceTension
 
-__all__ = ["STANDARD_GRAVITY", "Attached", "Gravity"]
+__all__ = ["STANDARD_GRAVITY", "Attached", "Gravity", "Skin", "SurfaceTension"]

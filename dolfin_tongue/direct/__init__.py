@@ -6,9 +6,10 @@ one volume constraint per cell), so that forces, constraints and tangents agree 
 share the dataclasses of the terms, of which only numbers are read here.
 
 Reading order: `elements` (shape functions, kappa) - `mesh` - `volume` (96), (101) - `tensors`,
-`isochoric`, `passive`, `rates` (stress and moduli at points) - `points` (element loops) - `forces`
-(which term has which law) - `model` (the semi-discrete equations, no dt) - `multipliers` (53)-(57)
-- `limits`, `integrate` (explicit methods) - `saddle`, `implicit` - `balance`, `trouble`.
+`isochoric`, `passive`, `rates` (stress and moduli at points) - `points` (element loops) - `faces`,
+`membranes` (47) - `forces` (which term has which law) - `model` (the semi-discrete equations, no
+dt) - `multipliers` (53)-(57) - `limits`, `integrate` (explicit methods) - `saddle`, `implicit` -
+`balance`, `trouble`.
 
 Conventions
 -----------

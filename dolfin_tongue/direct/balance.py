@@ -18,9 +18,9 @@ class Drift:
 
     Parameters
     ----------
-    momentum : over sum_K m_K |v_K| of the first state.
+    momentum : over the largest sum_K m_K |v_K| of the states.
     angular_momentum : likewise, with the distance to the centre of mass as lever.
-    energy : kinetic, stored and potential energy, over the first kinetic energy.
+    energy : kinetic, stored and potential energy, over the largest kinetic energy.
     """
 
     momentum: float
@@ -38,16 +38,15 @@ def momentum(model: Model, state: State) -> tuple[FloatArray, FloatArray]:
 def drift(model: Model, states: Iterable[State]) -> Drift:
     """How far momentum, angular momentum and energy leave their first values."""
     states = list(states)
-    first = states[0]
-    nodal = np.linalg.norm(model.mass @ first.velocity, axis=1)
+    nodal = np.array([np.linalg.norm(model.mass @ s.velocity, axis=1) for s in states])
     mass = np.asarray(model.mass.sum(axis=1)).ravel()
     lever = np.linalg.norm(model.mesh.points - mass @ model.mesh.points / mass.sum(), axis=1)
-    kinetic = 0.5 * float(np.sum(first.velocity * (model.mass @ first.velocity)))
+    kinetic = max(0.5 * float(np.sum(s.velocity * (model.mass @ s.velocity))) for s in states)
     pairs = [momentum(model, s) for s in states]
     linear, angular = (np.array(part) for part in zip(*pairs, strict=True))
     energy = np.array([model.energy(s.displacement, s.velocity) for s in states])
     return Drift(
-        float(np.linalg.norm(linear - linear[0], axis=1).max() / nodal.sum()),
-        float(np.linalg.norm(angular - angular[0], axis=1).max() / (nodal @ lever)),
+        float(np.linalg.norm(linear - linear[0], axis=1).max() / nodal.sum(axis=1).max()),
+        float(np.linalg.norm(angular - angular[0], axis=1).max() / (nodal @ lever).max()),
         float(np.abs(energy - energy[0]).max() / kinetic),
     )

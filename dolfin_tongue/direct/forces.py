@@ -1,6 +1,7 @@
-"""From terms to forces: one law or load per class of term.
+"""From terms to forces: one law, load or membrane per class of term.
 
-A law adds first Piola-Kirchhoff stress at quadrature points; a load is a nodal force. A term whose
+A law adds first Piola-Kirchhoff stress at quadrature points; a load is a nodal force; a membrane
+acts on the faces of a surface. A term whose
 class is not registered is refused by name: a subclass may differ in physics, so that it does not
 inherit the force of its base.
 """
@@ -8,21 +9,26 @@ inherit the force of its base.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.boundary.gravity import Gravity
+from dolfin_tongue.boundary.skin import Skin
+from dolfin_tongue.boundary.surface_tension import SurfaceTension
 from dolfin_tongue.constitutive.active import ActiveMuscles, ConstantFibreStress, FibreStress
 from dolfin_tongue.constitutive.passive import FibreReinforcedTissue, MooneyRivlin, ReportTissue
 from dolfin_tongue.constitutive.viscous import Viscosity
 from dolfin_tongue.direct import passive, rates
+from dolfin_tongue.direct.faces import FaceGroup, outer_groups, surface_groups
+from dolfin_tongue.direct.membranes import Film, Membrane, NeoHookean
 from dolfin_tongue.direct.mesh import Block, Mesh
-from dolfin_tongue.errors import NoDirectForce
+from dolfin_tongue.errors import NoDirectForce, UnknownName
+from dolfin_tongue.faces import BOUNDARY
 from dolfin_tongue.fibres import Fibres, Slots
-from dolfin_tongue.term import Term
+from dolfin_tongue.term import SurfaceTerm, Term
 
 #: Rate of F, shape (m, q, 3, 3), 1/s; None where no law of the scene needs it.
 Rate = FloatArray | None
@@ -67,11 +73,21 @@ class Surroundings:
     mesh : points and cells.
     density : kg/m3.
     fibres : the muscles; cells numbered as in the mesh.
+    surfaces : named surfaces, as corners of faces of shape (k, 4); -1 in those of triangles.
     """
 
     mesh: Mesh
     density: float
     fibres: Fibres
+    surfaces: Mapping[str, IntArray] = field(default_factory=dict)
+
+    def faces(self, surface: str) -> list[FaceGroup]:
+        """Faces of a surface; UnknownName lists the known ones."""
+        if surface == BOUNDARY:
+            return outer_groups(self.mesh)
+        if surface not in self.surfaces:
+            raise UnknownName("surface", surface, (*self.surfaces, BOUNDARY))
+        return surface_groups(self.mesh, self.surfaces[surface])
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,12 +310,18 @@ LAWS: dict[type[Term], Callable[..., Law]] = {
 #: Class of term -> a nodal force that depends neither on motion nor on time.
 LOADS: dict[type[Term], Callable[..., FloatArray]] = {Gravity: _gravity}
 
+#: Class of term -> its forces on a group of faces.
+MEMBRANES: dict[type[SurfaceTerm], Callable[..., Membrane]] = {
+    SurfaceTension: Film,
+    Skin: NeoHookean,
+}
+
 
 def laws_of(term: Term, around: Surroundings) -> list[Law]:
-    """Laws of a term, one per block; none for a load. NoDirectForce where there is neither."""
+    """Laws of a term, one per block; none for a load or membrane. NoDirectForce without any."""
     if type(term) in LAWS:
         return [LAWS[type(term)](term, around, block) for block in around.mesh.blocks]
-    if type(term) in LOADS:
+    if type(term) in LOADS or type(term) in MEMBRANES:
         return []
     raise NoDirectForce(term)
 
@@ -307,3 +329,11 @@ def laws_of(term: Term, around: Surroundings) -> list[Law]:
 def load_of(term: Term, around: Surroundings) -> FloatArray | None:
     """Nodal force of a load, shape (n, 3), N; None for a law."""
     return LOADS[type(term)](term, around) if type(term) in LOADS else None
+
+
+def membranes_of(term: Term, around: Surroundings) -> list[Membrane]:
+    """Membranes of a term, one per group of faces; none for other terms."""
+    if not (isinstance(term, SurfaceTerm) and type(term) in MEMBRANES):
+        return []
+    make, points = MEMBRANES[type(term)], around.mesh.points
+    return [make(term, group, points) for group in around.faces(term.surface)]

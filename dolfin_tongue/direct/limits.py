@@ -20,7 +20,7 @@ from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.constitutive.active import FibreStress
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
-from dolfin_tongue.term import Term
+from dolfin_tongue.term import SurfaceTerm, Term
 
 #: Smallest |z| on the boundary of the stability region of Runge-Kutta 4 in the left half-plane.
 RK4_RADIUS = 2.61
@@ -68,7 +68,7 @@ class StabilityLimits:
 
     def _cause(self, state: tuple[float, FloatArray, FloatArray], rate: float) -> str:
         """Name the term whose own radius is the largest."""
-        terms = [term for term, _ in self.model.laws]
+        terms = [term for term, _ in (*self.model.laws, *self.model.membranes)]
         parts = [self._radii(i, state, None, (term,)) for i, term in enumerate(terms)]
         bounds = [_bound(*part) for part in parts]
         worst = int(np.argmax(bounds)) if bounds else 0
@@ -133,6 +133,8 @@ def _describe(term: Term, c: float, w: float, rate: float) -> str:
     name = type(term).__name__
     if isinstance(term, FibreStress):
         kind = "the active stiffness" + (" (force-velocity slope)" if c > w else "")
+    elif isinstance(term, SurfaceTerm):
+        kind = "the surface stiffness"
     else:
         kind = "the viscosity" if c > w else "the passive stiffness"
     return f"{kind} of {name} (fastest rate {rate:.3g} 1/s)"

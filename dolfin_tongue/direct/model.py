@@ -9,7 +9,7 @@ Held nodes keep their rows in all arrays of shape (n, 3); `dofs` numbers the fre
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,7 +18,8 @@ import scipy.sparse as sp
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.boundary.attached import Attached
 from dolfin_tongue.direct import points, volume
-from dolfin_tongue.direct.forces import Law, Surroundings, laws_of, load_of
+from dolfin_tongue.direct.forces import Law, Surroundings, laws_of, load_of, membranes_of
+from dolfin_tongue.direct.membranes import Membrane
 from dolfin_tongue.direct.mesh import Block, Mesh, mesh_of
 from dolfin_tongue.errors import OutOfRange
 from dolfin_tongue.fibres import Fibres
@@ -46,6 +47,7 @@ class Problem:
     support : time, s -> displacement of the held nodes, shape (len(held), 3), m; None: they stand
         still.
     breakpoints, jumps : times at which the motion is not smooth, or jumps, s.
+    surfaces : named surfaces, as corners of faces of shape (k, 4); -1 in those of triangles.
     """
 
     mesh: Mesh
@@ -56,6 +58,7 @@ class Problem:
     support: Callable[[float], FloatArray] | None = None
     breakpoints: tuple[float, ...] = ()
     jumps: tuple[float, ...] = ()
+    surfaces: Mapping[str, IntArray] = field(default_factory=dict)
 
 
 def problem_of(scene: Scene) -> Problem:
@@ -72,7 +75,7 @@ def problem_of(scene: Scene) -> Problem:
 
     return Problem(
         mesh_of(body), scene.terms, body.density, body.fibres, held,
-        support if parts else None, scene.breakpoints, scene.jumps,
+        support if parts else None, scene.breakpoints, scene.jumps, body.surfaces,
     )  # fmt: skip
 
 
@@ -94,13 +97,16 @@ class Model:
         if mass not in ("consistent", "lumped"):
             raise OutOfRange("mass", mass, '"consistent" or "lumped"')
         self.problem, self.mesh, self.blocks = problem, problem.mesh, problem.mesh.blocks
-        around = Surroundings(problem.mesh, problem.density, problem.fibres)
+        around = Surroundings(problem.mesh, problem.density, problem.fibres, problem.surfaces)
         self.laws: list[tuple[Term, list[Law]]] = []
+        self.membranes: list[tuple[Term, list[Membrane]]] = []
         self.load = np.zeros(problem.mesh.points.shape)
         for term in problem.terms:
             laws, load = laws_of(term, around), load_of(term, around)
             if laws:
                 self.laws.append((term, laws))
+            if membranes := membranes_of(term, around):
+                self.membranes.append((term, membranes))
             if load is not None:
                 self.load += load
         self.rated = any(laws[0].rated for _, laws in self.laws)
@@ -171,6 +177,9 @@ class Model:
     def force(self, time: float, displacement: FloatArray, velocity: FloatArray) -> FloatArray:
         """All nodal forces but inertia and pressure, shape (n, 3), N."""
         out = self.load.copy()
+        for _, membranes in self.membranes:
+            for membrane in membranes:
+                membrane.add_force(self.mesh.points + displacement, out)
         if not self.laws:
             return out
         strains = self.strains(displacement, velocity)
@@ -213,6 +222,11 @@ class Model:
             out = np.zeros((len(block.cells), size, size))
             points.add_element_matrices(moduli, block.gradients, block.weights, out)
             result.append(out)
+        for term, membranes in self.membranes if factor else ():
+            if terms is None or any(term is one for one in terms):
+                for part in membranes:
+                    x = self.mesh.points + displacement
+                    part.add_tangent(x, factor, result[part.group.block])
         return result
 
     # -- volumes -------------------------------------------------------------------------------
@@ -297,9 +311,11 @@ class Model:
     # -- energy --------------------------------------------------------------------------------
 
     def energy(self, displacement: FloatArray, velocity: FloatArray) -> float:
-        """Kinetic energy, stored energy of the passive laws and energy of the loads, J."""
+        """Kinetic energy, stored energy of laws and membranes, and energy of the loads, J."""
         total = 0.5 * float(np.sum(velocity * (self.mass @ velocity)))
         total -= float(np.sum(self.load * displacement))
+        x = self.mesh.points + displacement
+        total += sum(part.energy(x) for _, membranes in self.membranes for part in membranes)
         strains = self.strains(displacement, velocity)
         for number, (block, (F, _)) in enumerate(zip(self.blocks, strains, strict=True)):
             for _, laws in self.laws:

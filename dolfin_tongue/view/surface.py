@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse
 
 from dolfin_tongue.body import Body
+from dolfin_tongue.faces import outer_faces
 from dolfin_tongue.fibres import FloatArray, IntArray
-from dolfin_tongue.shape import FACES
 
 #: Faces that meet at a larger angle keep a crease between them, degrees.
 CREASE = 50.0
@@ -35,13 +35,9 @@ class Surface:
     """
 
     def __init__(self, body: Body, cuts: int = 3):
-        faces = body.cells[:, FACES].reshape(-1, 4)
-        _, first, count = np.unique(
-            np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-        )
-        boundary = np.sort(first[count == 1])
-        self.faces: IntArray = faces[boundary]
-        self.cell_of_face: IntArray = boundary // len(FACES)
+        self.faces: IntArray
+        self.cell_of_face: IntArray
+        self.faces, self.cell_of_face = outer_faces(body.cells)
         pairs = np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
         self.edges: IntArray = np.unique(np.sort(pairs, axis=1), axis=0)
         line = np.linspace(0.0, 1.0, cuts + 1)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dolfin_tongue.body import Body
-from dolfin_tongue.boundary import Gravity
+from dolfin_tongue.boundary import Gravity, Skin, SurfaceTension
 from dolfin_tongue.constitutive import (
     ActiveMuscles,
     ConstantFibreStress,
@@ -35,6 +35,8 @@ TERMS: list[Term] = [
     ActiveMuscles({"along": Constant(0.6), "across": SmoothRamp(0.4)}),
     ConstantFibreStress({"along": Constant(0.6), "across": SmoothRamp(0.4)}, max_stress=2e4),
     Gravity((1.0, -2.0, -9.0)),
+    SurfaceTension(3.0),
+    Skin(20e3, 1e-3),
 ]
 
 

@@ -1,0 +1,163 @@
+"""Faces of elements as isoparametric surfaces (43): tables by kind, the boundary, named surfaces.
+
+The shape functions Y_K of a face are those of the element on that face, so that their derivatives
+by the two parameters of the face are those of the element along two edges of the master element.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.direct.elements import (
+    BRICK8,
+    BRICK20,
+    BRICK_EDGES,
+    PRISM6,
+    TETRAHEDRON4,
+    ElementKind,
+)
+from dolfin_tongue.direct.mesh import Mesh
+from dolfin_tongue.faces import row_places
+
+
+@dataclass(frozen=True, eq=False)
+class FaceKind:
+    """Equal faces of one kind of element.
+
+    Parameters
+    ----------
+    corners : 3 or 4.
+    nodes : ndarray, shape (s, k) -- for each such face its nodes in the element: the corners
+        outward by the right-hand rule, then the nodes on the edges between them.
+    gradients : ndarray, shape (q, k, 2) -- Y_K,alpha at the quadrature points, the same on all.
+    weights : ndarray, shape (q,).
+    """
+
+    corners: int
+    nodes: IntArray
+    gradients: FloatArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FaceGroup:
+    """Faces of one kind on elements of one block.
+
+    Parameters
+    ----------
+    kind : of the faces.
+    block : place of the block of elements in `Mesh.blocks`.
+    cells : ndarray, shape (f,) -- the element of each face, as its place in the block.
+    local : ndarray, shape (f, k) -- nodes of the face as places among those of the element.
+    faces : ndarray, shape (f, k) -- the same as node numbers.
+    """
+
+    kind: FaceKind
+    block: int
+    cells: IntArray
+    local: IntArray
+    faces: IntArray
+
+    @property
+    def keys(self) -> IntArray:
+        """Sorted corner numbers, shape (f, 4); -1 leads those of a triangle."""
+        corners = self.faces[:, : self.kind.corners]
+        width = ((0, 0), (4 - self.kind.corners, 0))
+        return np.sort(np.pad(corners, width, constant_values=-1), axis=1)
+
+    def part(self, chosen: IntArray) -> FaceGroup:
+        """Pick some of the faces."""
+        return FaceGroup(
+            self.kind, self.block, self.cells[chosen], self.local[chosen], self.faces[chosen]
+        )
+
+
+def outer_groups(mesh: Mesh) -> list[FaceGroup]:
+    """All faces that belong to one element only."""
+    groups = []
+    for number, block in enumerate(mesh.blocks):
+        for kind in FACE_KINDS[block.kind.name]:
+            count, faces = len(block.cells), len(kind.nodes)
+            cells = np.repeat(np.arange(count), faces)
+            local = np.tile(kind.nodes, (count, 1))
+            nodes = block.cells[cells[:, None], local]
+            groups.append(FaceGroup(kind, number, cells, local, nodes))
+    keys = np.concatenate([group.keys for group in groups])
+    _, inverse, owners = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    outside = owners[inverse.ravel()] == 1
+    ends = np.cumsum([len(group.cells) for group in groups])
+    parts = np.split(outside, ends[:-1])
+    return [
+        group.part(np.flatnonzero(keep))
+        for group, keep in zip(groups, parts, strict=True)
+        if keep.any()
+    ]
+
+
+def surface_groups(mesh: Mesh, corners: IntArray) -> list[FaceGroup]:
+    """Outer faces with given corners.
+
+    Parameters
+    ----------
+    mesh : the elements.
+    corners : ndarray, shape (k, 4) -- node numbers of the corners, in any order; -1 as one of them
+        makes a triangle.
+    """
+    wanted = np.unique(np.sort(corners, axis=1), axis=0)
+    groups = []
+    for group in outer_groups(mesh):
+        chosen = np.flatnonzero(row_places(group.keys, wanted) >= 0)
+        if chosen.size:
+            groups.append(group.part(chosen))
+    return groups
+
+
+# -- tables --------------------------------------------------------------------------------------
+
+
+def _quadrilaterals(kind: ElementKind, nodes: IntArray, count: int) -> FaceKind:
+    """Faces over [-1, 1]^2 with count x count Gauss points."""
+    point, weight = np.polynomial.legendre.leggauss(count)
+    s, t = (grid.ravel() for grid in np.meshgrid(point, point, indexing="ij"))
+    a, b, c, d = kind.nodes[nodes[0, :4]]
+    tangents = np.stack([b - a, d - a], axis=1) / 2.0
+    points = (a + b + c + d) / 4.0 + np.stack([s, t], axis=1) @ tangents.T
+    gradients = kind.gradients(points)[:, nodes[0]] @ tangents
+    return FaceKind(4, nodes, np.ascontiguousarray(gradients), np.outer(weight, weight).ravel())
+
+
+def _triangles(kind: ElementKind, nodes: IntArray) -> FaceKind:
+    """Plane faces over a triangle, where one point is exact."""
+    a, b, c = kind.nodes[nodes[0]]
+    tangents = np.stack([b - a, c - a], axis=1)
+    gradients = kind.gradients(((a + b + c) / 3.0)[None])[:, nodes[0]] @ tangents
+    return FaceKind(3, nodes, np.ascontiguousarray(gradients), np.array([0.5]))
+
+
+_BRICK = np.array(
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+)  # fmt: skip
+_TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+def _with_middles(faces: IntArray) -> IntArray:
+    """Faces of brick 20: corners, then the mid-node of each edge in the same order."""
+    place = {frozenset(edge): 8 + number for number, edge in enumerate(BRICK_EDGES.tolist())}
+    rows = faces.tolist()
+    middles = [[place[frozenset((row[i], row[(i + 1) % 4]))] for i in range(4)] for row in rows]
+    return np.concatenate([faces, middles], axis=1)
+
+
+#: Kind of element -> its kinds of faces.
+FACE_KINDS: dict[str, tuple[FaceKind, ...]] = {
+    "brick8": (_quadrilaterals(BRICK8, _BRICK, 2),),
+    "brick20": (_quadrilaterals(BRICK20, _with_middles(_BRICK), 3),),
+    "tetrahedron4": (_triangles(TETRAHEDRON4, _TETRAHEDRON),),
+    "prism6": (
+        _triangles(PRISM6, np.array([[0, 2, 1], [3, 4, 5]])),
+        _quadrilaterals(PRISM6, np.array([[0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]]), 2),
+    ),
+}
