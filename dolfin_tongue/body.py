@@ -8,11 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName, listing
+from dolfin_tongue.arrays import FloatArray, IntArray, real_numbers, whole_numbers
+from dolfin_tongue.errors import BadMesh, UnknownName, listing, require_positive
 from dolfin_tongue.faces import BOUNDARY, check_surface, outer_faces
 from dolfin_tongue.fibres import Fibres
-from dolfin_tongue.shape import corner_jacobians, gauss_jacobians
+from dolfin_tongue.shape import FACES, corner_jacobians, gauss_jacobians
+
+#: Length beyond which coordinates are taken for millimetres, m.
+LARGEST_SIZE = 5.0
 
 #: Mass density of tongue tissue, kg/m3 (as in Buchaillard et al. 2009).
 TISSUE_DENSITY = 1040.0
@@ -39,7 +42,7 @@ class Body:
     ------
     BadMesh : wrong shapes, NaN coordinates, cells that name missing nodes, inverted cells (listed),
         surfaces that are empty, inside the body or point inward (listed).
-    OutOfRange : density <= 0.
+    OutOfRange : density not finite or <= 0.
     """
 
     points: FloatArray
@@ -52,8 +55,8 @@ class Body:
     surfaces: Mapping[str, IntArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.density > 0:
-            raise OutOfRange("density", self.density, "> 0", "kg/m3")
+        require_positive(self, "kg/m3", density=self.density)
+        self._convert()
         self._check_arrays()
         self._check_names()
         inverted = np.flatnonzero(~(gauss_jacobians(self.points, self.cells).min(axis=1) > 0))
@@ -65,6 +68,27 @@ class Body:
             )
         self._check_surfaces()
 
+    def _convert(self) -> None:
+        """Take lists and whole numbers of any kind; refuse what only looks like them."""
+        sets = {
+            name: np.atleast_1d(whole_numbers(f"{self.name}: the region {name!r}", nodes))
+            for name, nodes in self.node_sets.items()
+        }
+        marks = {
+            name: int(np.squeeze(whole_numbers(f"{self.name}: the landmark {name!r}", [node])))
+            for name, node in self.landmarks.items()
+            if np.ndim(node) == 0
+        }
+        if several := set(self.landmarks) - set(marks):
+            raise BadMesh(f"{self.name}: landmark(s) {listing(several)} must be one node each")
+        for name, value in (
+            ("points", real_numbers(f"{self.name}: points", self.points)),
+            ("cells", whole_numbers(f"{self.name}: cells", self.cells)),
+            ("node_sets", sets),
+            ("landmarks", marks),
+        ):
+            object.__setattr__(self, name, value)
+
     def _check_arrays(self) -> None:
         if self.points.ndim != 2 or self.points.shape[1] != 3:
             raise BadMesh(f"{self.name}: points must have shape (n, 3), not {self.points.shape}")
@@ -73,6 +97,15 @@ class Body:
         bad = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
         if bad.size:
             raise BadMesh(f"{self.name}: coordinates of node(s) {listing(bad)} are not finite")
+        size = np.ptp(self.points, axis=0).max()
+        if size > LARGEST_SIZE:
+            raise BadMesh(
+                f"{self.name}: it is {size:.3g} m long; coordinates are metres: multiply by 1e-3 if "
+                "yours are millimetres"
+            )
+        self._check_cells()
+
+    def _check_cells(self) -> None:
         used = np.unique(self.cells)
         if used[0] < 0 or used[-1] >= len(self.points):
             raise BadMesh(
@@ -82,6 +115,21 @@ class Body:
         if len(used) != len(self.points):
             unused = np.setdiff1d(np.arange(len(self.points)), used)
             raise BadMesh(f"{self.name}: node(s) {listing(unused)} belong to no cell")
+        ordered = np.sort(self.cells, axis=1)
+        twice = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
+        if twice.size:
+            raise BadMesh(f"{self.name}: cell(s) {listing(twice)} name a node twice")
+        _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
+        if (count > 1).any():
+            raise BadMesh(f"{self.name}: cell(s) {listing(first[count > 1])} are listed repeatedly")
+        faces = np.sort(self.cells[:, FACES].reshape(-1, 4), axis=1)
+        _, first, count = np.unique(faces, axis=0, return_index=True, return_counts=True)
+        if (count > 2).any():
+            owners = first[count > 2] // len(FACES)
+            raise BadMesh(
+                f"{self.name}: a face of cell(s) {listing(np.unique(owners))} belongs to more than "
+                "two cells: cells overlap"
+            )
 
     def _check_names(self) -> None:
         points = {name: np.array([node]) for name, node in self.landmarks.items()}

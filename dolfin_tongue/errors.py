@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import isfinite
+from numbers import Real
 from typing import Any
 
 
@@ -42,7 +44,8 @@ class OutOfRange(TongueError, ValueError):
 
     def __init__(self, name: str, value: Any, allowed: str, unit: str = ""):
         unit = f" {unit}" if unit else ""
-        super().__init__(f"{name} = {value}{unit} is not allowed: it must be {allowed}{unit}")
+        goal = f"{allowed}{unit if allowed[-1:].isdigit() else ''}"
+        super().__init__(f"{name} = {value}{unit} is not allowed: it must be {goal}")
 
 
 class BadMesh(TongueError, ValueError):
@@ -88,3 +91,22 @@ def listing(items: Iterable[Any], limit: int = 20) -> str:
     items = list(items)
     text = ", ".join(str(item) for item in items[:limit])
     return text + (f", ... ({len(items) - limit} more)" if len(items) > limit else "")
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite real number (no text, no truth value, no array)."""
+    return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
+
+
+def require_positive(owner: object, unit: str, **numbers: Any) -> None:
+    """Raise OutOfRange unless every number is finite and > 0."""
+    for name, value in numbers.items():
+        if not (is_number(value) and value > 0):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number > 0", unit)
+
+
+def require_not_negative(owner: object, unit: str, **numbers: Any) -> None:
+    """Raise OutOfRange unless every number is finite and >= 0."""
+    for name, value in numbers.items():
+        if not (is_number(value) and value >= 0):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number >= 0", unit)

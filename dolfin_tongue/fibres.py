@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.arrays import FloatArray, IntArray, real_numbers, whole_numbers
 from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName, listing
 
 
@@ -40,7 +40,13 @@ class MuscleFibres:
     density: FloatArray
 
     def __post_init__(self) -> None:
+        what = f"muscle {self.name!r}"
+        object.__setattr__(self, "cells", whole_numbers(f"{what}: cells", self.cells))
+        for name in ("directions", "density"):
+            object.__setattr__(self, name, real_numbers(f"{what}: {name}", getattr(self, name)))
         count = len(self.cells)
+        if not count:
+            raise BadMesh(f"{what} has no cells; leave it out of the body")
         if self.directions.shape != (count, 3) or self.density.shape != (count,):
             raise BadMesh(
                 f"muscle {self.name!r}: {count} cells need directions of shape ({count}, 3) and "

@@ -15,7 +15,7 @@ import ufl
 
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.errors import OutOfRange, require_not_negative, require_positive
 from dolfin_tongue.kinematics import Expr, Kinematics
 
 
@@ -122,20 +122,6 @@ class Support(ABC):
         -------
         ndarray, shape (k, 3), m.
         """
-
-
-def require_positive(owner: object, unit: str, **numbers: float) -> None:
-    """Raise OutOfRange unless every number is finite and > 0."""
-    for name, value in numbers.items():
-        if not (np.isfinite(value) and value > 0):
-            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "finite and > 0", unit)
-
-
-def require_not_negative(owner: object, unit: str, **numbers: float) -> None:
-    """Raise OutOfRange unless every number is finite and >= 0."""
-    for name, value in numbers.items():
-        if not (np.isfinite(value) and value >= 0):
-            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "finite and >= 0", unit)
 
 
 def require_vector(owner: object, name: str, value: Any) -> None:

@@ -13,6 +13,7 @@ import ufl
 
 from dolfin_tongue.body import Body
 from dolfin_tongue.control import Control
+from dolfin_tongue.control.sources import require_activation
 from dolfin_tongue.errors import BadScene, OutOfRange
 from dolfin_tongue.kinematics import Expr, Kinematics
 from dolfin_tongue.term import Fields, Term, require_positive
@@ -103,6 +104,17 @@ class FibreStress(Term):
 
     def __post_init__(self) -> None:
         require_positive(self, "Pa", max_stress=self.max_stress)
+        if not isinstance(self.activation, Mapping):
+            raise BadScene(
+                f"{type(self).__name__}: activation must map names of muscles to controls, e.g. "
+                '{"styloglossus": Ramp(0.5)}'
+            )
+        for name, control in self.activation.items():
+            if isinstance(control, type) or not isinstance(control, Control):
+                raise BadScene(
+                    f"the activation of {name!r} is {control!r}, which is no control; use "
+                    "Constant(level), Ramp(level), Table(times, values) or an object like them"
+                )
         if not self.activation:
             raise BadScene(
                 f"{type(self).__name__} without muscles: leave the term out of the scene instead"
@@ -120,7 +132,10 @@ class FibreStress(Term):
 
     def activations(self, time: float) -> np.ndarray:
         """Activation vector at a time (s), shape (len(names),)."""
-        return np.array([control(time) for control in self.activation.values()])
+        values = {name: control(time) for name, control in self.activation.items()}
+        for name, value in values.items():
+            require_activation(value, f"activation of {name!r} at t = {time:g} s")
+        return np.array(list(values.values()), dtype=float)
 
     @property
     def breakpoints(self) -> tuple[float, ...]:

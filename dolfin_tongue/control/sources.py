@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from dolfin_tongue.errors import BadScene, OutOfRange
+from dolfin_tongue.errors import BadScene, OutOfRange, is_number
 
 
 @runtime_checkable
@@ -28,13 +28,13 @@ class Control(Protocol):
 
 def require_activation(value: float, what: str = "activation") -> None:
     """Raise OutOfRange unless the value lies in [0, 1] (NaN does not)."""
-    if not 0.0 <= value <= 1.0:
+    if not (is_number(value) and 0.0 <= value <= 1.0):
         raise OutOfRange(what, value, "in [0, 1]")
 
 
 def require_time(value: float, what: str) -> None:
     """Raise OutOfRange unless the time is finite."""
-    if not np.isfinite(value):
+    if not is_number(value):
         raise OutOfRange(what, value, "finite", "s")
 
 
@@ -107,7 +107,7 @@ class Ramp:
     def __post_init__(self) -> None:
         require_activation(self.level)
         require_time(self.start, "start")
-        if not (self.duration > 0 and np.isfinite(self.duration)):
+        if not (is_number(self.duration) and self.duration > 0):
             raise OutOfRange("duration", self.duration, "> 0 (use Step for a jump)", "s")
 
     def __call__(self, time: float) -> float:
@@ -165,14 +165,14 @@ class Table:
             )
         for i, value in enumerate(self.values):
             require_activation(value, f"activation in row {i} of the table")
+        for time in self.times:
+            require_time(time, "time in a table")
         for i, (before, after) in enumerate(zip(self.times, self.times[1:], strict=False)):
             if not after > before:
                 raise BadScene(
                     f"the times of a table must increase: row {i + 1} has {after} s after "
                     f"{before} s"
                 )
-        for time in self.times:
-            require_time(time, "time in a table")
 
     def __call__(self, time: float) -> float:
         """Activation at a time (s)."""

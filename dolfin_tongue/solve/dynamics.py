@@ -84,6 +84,14 @@ class TimeSteps:
             raise OutOfRange("TimeSteps.spectral_radius", self.spectral_radius, "in [0, 1]")
         if self.tolerance is not None:
             require_positive(self, "m", tolerance=self.tolerance)
+        for name in ("smallest", "largest"):
+            if getattr(self, name) is not None:
+                require_positive(self, "s", **{name: getattr(self, name)})
+        smallest, largest = self.step_limits
+        if not smallest <= self.dt <= largest:
+            raise OutOfRange("TimeSteps.dt", self.dt, f"between {smallest:g} and {largest:g}", "s")
+        if not isinstance(self.newton, Tolerances):
+            raise OutOfRange("TimeSteps.newton", self.newton, "of the class Tolerances")
         if self.method not in METHODS:
             raise OutOfRange("TimeSteps.method", self.method, f"one of {', '.join(METHODS)}")
 
@@ -257,7 +265,7 @@ class Dynamics:
             if reason > 0 and not self._too_large(error, dt):
                 break
             dt = self._cut(dt, error)
-            if dt < self.steps.step_limits[0]:
+            if not dt >= self.steps.step_limits[0]:
                 body = self.system.scene.body
                 raise NotConverged(
                     _name(reason), state.time, where_and_why(body, state.displacement)
