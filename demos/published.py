@@ -27,12 +27,14 @@ def main(options: Options) -> dict[str, object]:
         )  # fmt: skip
     if options.pictures:
         picture_run(run, "published tongue: gravity, then GGP at 50 %")
-    moved = {name: 1e3 * run.last.displacement[node] for name, node in body.landmarks.items()}
+    marks = {node: name for name, node in body.landmarks.items()}  # each node once
+    moved = {name: 1e3 * run.last.displacement[node] for node, name in marks.items()}
     return {
         f"{name} moved (x, y, z), mm": " ".join(f"{x:.2f}" for x in displacement)
         for name, displacement in moved.items()
     } | {
         "largest relative volume change of a cell": run.summary["max_volume_change"],
         "largest |det F - 1| at a quadrature point": run.summary["max_local_volume_change"],
+        "smallest det F at a quadrature point": run.summary["smallest_det_F"],
         "simulated seconds per wall second": run.summary["simulated_seconds_per_wall_second"],
     }

@@ -36,7 +36,7 @@ def main(options: Options) -> dict[str, object]:
     node = body.landmark("tip")
     tip = 1e3 * run.last.displacement[node]
     return {
-        "tip moved to the back and up, mm": f"{tip[0]:+.2f} {tip[2]:+.2f}",
+        "tip moved, mm": f"back {tip[0]:+.2f}, up {tip[2]:+.2f}",
         "largest relative volume change of a cell": run.summary["max_volume_change"],
         "largest |det F - 1| at a quadrature point": run.summary["max_local_volume_change"],
         "energy balance error / exchanged energy": run.summary["balance_error_per_exchanged"],

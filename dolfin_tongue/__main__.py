@@ -1,5 +1,5 @@
 """``python3 -m dolfin_tongue``."""
 
-from dolfin_tongue.cli import run
+from dolfin_tongue.cli import app
 
-run()
+app()

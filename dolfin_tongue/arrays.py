@@ -16,7 +16,8 @@ def whole_numbers(what: str, value: Any) -> IntArray:
     """Array of node or cell numbers; BadMesh for anything that only looks like numbers."""
     array = np.asarray(value)
     if array.dtype.kind not in "iu":
-        hint = "a mask? use np.flatnonzero(mask)" if array.dtype.kind == "b" else "use whole numbers"
+        mask = array.dtype.kind == "b"
+        hint = "a mask? use np.flatnonzero(mask)" if mask else "use whole numbers"
         raise BadMesh(f"{what} must hold whole numbers, not {array.dtype}: {hint}")
     return array.astype(np.int64)
 

@@ -100,8 +100,8 @@ class Body:
         size = np.ptp(self.points, axis=0).max()
         if size > LARGEST_SIZE:
             raise BadMesh(
-                f"{self.name}: it is {size:.3g} m long; coordinates are metres: multiply by 1e-3 if "
-                "yours are millimetres"
+                f"{self.name}: it is {size:.3g} m long; coordinates are metres: multiply by 1e-3 "
+                "if yours are millimetres"
             )
         self._check_cells()
 
@@ -121,7 +121,7 @@ class Body:
             raise BadMesh(f"{self.name}: cell(s) {listing(twice)} name a node twice")
         _, first, count = np.unique(ordered, axis=0, return_index=True, return_counts=True)
         if (count > 1).any():
-            raise BadMesh(f"{self.name}: cell(s) {listing(first[count > 1])} are listed repeatedly")
+            raise BadMesh(f"{self.name}: cell(s) {listing(first[count > 1])} are listed twice")
         faces = np.sort(self.cells[:, FACES].reshape(-1, 4), axis=1)
         _, first, count = np.unique(faces, axis=0, return_index=True, return_counts=True)
         if (count > 2).any():

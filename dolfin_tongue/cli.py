@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +17,12 @@ from rich.table import Column, Table
 from dolfin_tongue import demo as demos
 from dolfin_tongue.errors import TongueError
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+)
 
 
 @app.callback()
@@ -43,10 +50,11 @@ def demo(
     solver: Annotated[str, typer.Option(help="fenicsx or direct")] = "fenicsx",
 ) -> None:
     """Run a demo; its files are in RESULTS/NAME."""
-    if show_list:
-        return _print_table("demos", demos.available())
-    options = demos.Options(results / name, data, dt, refinement, pictures, resume, solver)
-    _run("demo", name, options)
+    with _clear_errors():
+        if show_list:
+            return _print_table("demos", demos.available())
+        options = demos.Options(results / name, data, dt, refinement, pictures, resume, solver)
+        _run("demo", name, options)
 
 
 @app.command()
@@ -59,10 +67,11 @@ def bench(
     refinement: Annotated[int, typer.Option(help="elements per edge of each of the 42")] = 1,
 ) -> None:
     """Run a benchmark; its files are in RESULTS/bench_NAME."""
-    if show_list:
-        return _print_table("benchmarks", demos.available("benchmark"))
-    options = demos.Options(results / f"bench_{name}", data, dt, refinement)
-    _run("benchmark", name, options)
+    with _clear_errors():
+        if show_list:
+            return _print_table("benchmarks", demos.available("benchmark"))
+        options = demos.Options(results / f"bench_{name}", data, dt, refinement)
+        _run("benchmark", name, options)
 
 
 def _run(kind: str, name: str, options: demos.Options) -> None:
@@ -70,7 +79,7 @@ def _run(kind: str, name: str, options: demos.Options) -> None:
     begin = clock.perf_counter()
     _print_table(f"{kind} {name}", main(options))
     Console(soft_wrap=True).print(
-        f"{clock.perf_counter() - begin:.1f} s in all; results in {options.folder}/"
+        f"{clock.perf_counter() - begin:.1f} s in all; results in {options.folder.resolve()}/"
     )
 
 
@@ -90,14 +99,20 @@ def _text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def run() -> None:
-    """Run the command line; errors of the package end it with one clear line, not a traceback."""
+@contextmanager
+def _clear_errors() -> Iterator[None]:
+    """End the command with one clear line instead of a traceback."""
+    console = Console(stderr=True, soft_wrap=True)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a run saves what it has
     try:
-        app()
-    except TongueError as error:
-        Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, style="red")
-        sys.exit(1)
+        yield
+    except (TongueError, OSError) as error:
+        console.print(f"error: {error}", markup=False, style="red")
+        raise typer.Exit(1) from error
+    except KeyboardInterrupt as error:
+        console.print("interrupted; a run goes on with --resume")
+        raise typer.Exit(130) from error
 
 
 if __name__ == "__main__":
-    run()
+    app()

@@ -13,7 +13,7 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from dolfin_tongue.direct.implicit import Implicit
-from dolfin_tongue.errors import TongueError, UnknownName
+from dolfin_tongue.errors import TongueError, UnknownName, require_positive
 from dolfin_tongue.solve.dynamics import TimeSteps
 
 #: Demos and benchmarks stand beside the package in a checkout, each a file with a `main`.
@@ -47,6 +47,8 @@ class Options:
     def __post_init__(self) -> None:
         if self.solver not in ("fenicsx", "direct"):
             raise UnknownName("solver", self.solver, ("fenicsx", "direct"))
+        if self.dt is not None:
+            require_positive(self, "s", dt=self.dt)
 
     def steps(self, dt: float) -> TimeSteps | Implicit:
         """Time steps of the chosen solver: of the size asked for, or else `dt` (s)."""

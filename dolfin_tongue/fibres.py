@@ -14,6 +14,11 @@ import numpy as np
 from dolfin_tongue.arrays import FloatArray, IntArray, real_numbers, whole_numbers
 from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName, listing
 
+#: Specific tension of muscle, Pa: 22 N/cm2, with which Buchaillard, Perrier and Payan (2009,
+#: J. Acoust. Soc. Am. 126:2033-2051) turn cross-sections of tongue muscles into forces. It is the
+#: stress that a fibre density of 1 stands for.
+SPECIFIC_TENSION = 220e3
+
 
 @dataclass(frozen=True)
 class MuscleFibres:

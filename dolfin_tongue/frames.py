@@ -31,8 +31,6 @@ class Frames:
     def __init__(self, folder: Path, body: Body):
         self.folder, self.body = folder, body
         self.times: list[float] = []
-        write_array(self._path("points"), body.points)
-        write_array(self._path("cells"), body.cells.astype(np.int64))
 
     def _path(self, name: str) -> Path:
         return self.folder / "frames" / f"{name}.bin"
@@ -40,6 +38,9 @@ class Frames:
     def append(self, state: State) -> None:
         """Write a state as the next frame."""
         number = len(self.times)
+        if not number:
+            write_array(self._path("points"), self.body.points)
+            write_array(self._path("cells"), self.body.cells.astype(np.int64))
         for name, _, _ in FIELDS:
             write_array(self._path(f"{name}_{number:05d}"), getattr(state, name))
         self.times.append(state.time)

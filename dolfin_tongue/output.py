@@ -3,20 +3,38 @@
 from __future__ import annotations
 
 import csv
+import fcntl
 import hashlib
 import json
-import pickle
+import zipfile
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, TextIO
 
 import numpy as np
 
-from dolfin_tongue.errors import BadScene, TongueError
+from dolfin_tongue.errors import BadScene, TongueError, require_positive
 from dolfin_tongue.files import replacing, write_json, write_text
 from dolfin_tongue.frames import Frames
 from dolfin_tongue.observe import landmark_positions
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.state import State
+
+#: What reading damaged files raises.
+_DAMAGED = (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile)
+
+
+def _claim(folder: Path) -> TextIO:
+    """Lock a folder for this run; TongueError if another run writes there."""
+    lock = (folder / ".lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        lock.close()
+        raise TongueError(f"another run writes to {folder}; choose another folder") from error
+    return lock
 
 
 class Table:
@@ -72,13 +90,15 @@ class Recorder:
     """
 
     def __init__(self, folder: Path, scene: Scene, frame_interval: float):
-        folder.mkdir(parents=True, exist_ok=True)
+        require_positive(self, "s", frame_interval=frame_interval)
         self.folder, self.scene = folder, scene
         self.frame_interval = frame_interval
+        self._fingerprint = fingerprint(scene)
+        folder.mkdir(parents=True, exist_ok=True)
+        self._lock = _claim(folder)
         self.frames = Frames(folder, scene.body)
         self.trajectories = Table(folder / "trajectories.csv")
         self.steps = Table(folder / "steps.csv")
-        self._fingerprint = fingerprint(scene)
 
     def record(self, state: State, observed: dict[str, float]) -> bool:
         """Write an accepted state; whether it became a frame."""
@@ -114,22 +134,38 @@ class Recorder:
         path = self.folder / "checkpoint.npz"
         if not path.exists():
             return None
-        with np.load(path) as saved:
+        try:
+            with np.load(path) as file:
+                saved = {name: file[name] for name in file.files}
             if str(saved["fingerprint"]) != self._fingerprint:
                 raise BadScene(
                     f"{self.folder} holds a run of another scene; resume with the same body, terms "
                     "and supports, or choose another folder"
                 )
-            state = State(
-                float(saved["time"]), saved["displacement"], saved["velocity"], saved["pressure"],
-                float(saved["step"]),
-            )  # fmt: skip
-            memory = json.loads(str(saved["memory"]))
-            times = saved["frame_times"].tolist()
-        self.frames.keep_until(times, state.time)
-        self.trajectories.continue_until(state.time)
-        self.steps.continue_until(state.time)
+            state, memory = self._saved_state(saved), json.loads(str(saved["memory"]))
+            self.frames.keep_until(saved["frame_times"].tolist(), state.time)
+            self.frames.read_all()
+            self.trajectories.continue_until(state.time)
+            self.steps.continue_until(state.time)
+        except _DAMAGED as error:
+            raise BadScene(
+                f"the run in {self.folder} cannot be resumed, its files are damaged ({error}); "
+                "start anew without resuming, or in another folder"
+            ) from error
         return state, memory
+
+    def _saved_state(self, saved: dict[str, Any]) -> State:
+        """State of a checkpoint; ValueError if it is not one of this body."""
+        state = State(
+            float(saved["time"]), saved["displacement"], saved["velocity"], saved["pressure"],
+            float(saved["step"]),
+        )  # fmt: skip
+        arrays = (state.displacement, state.velocity, state.pressure)
+        shapes = (self.scene.body.points.shape,) * 2 + ((len(self.scene.body.cells),),)
+        finite = all(np.isfinite(a).all() for a in arrays)
+        if not finite or tuple(a.shape for a in arrays) != shapes:
+            raise ValueError("the checkpoint does not fit the body")
+        return state
 
     def summary(self, content: dict[str, Any]) -> None:
         """Write ``summary.json``."""
@@ -139,13 +175,35 @@ class Recorder:
         """Close the tables."""
         self.trajectories.close()
         self.steps.close()
+        self._lock.close()
 
 
 def fingerprint(scene: Scene) -> str:
-    """Return a key that two scenes share if and only if their contents are the same."""
-    try:
-        return hashlib.sha256(pickle.dumps(scene)).hexdigest()
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise TongueError(
-            f"this scene cannot be saved ({error}); use named functions and classes in its terms"
-        ) from error
+    """Return a key that two scenes share if their contents are the same."""
+    digest = hashlib.sha256()
+    _feed(digest, scene)
+    return digest.hexdigest()
+
+
+def _feed(digest: Any, value: Any) -> None:
+    """Feed a value to a hash by its contents: fields, arrays, numbers, code of functions."""
+    if isinstance(value, np.ndarray):
+        digest.update(f"{value.dtype.kind}{value.shape}".encode() + value.tobytes())
+    elif is_dataclass(value) and not isinstance(value, type):
+        digest.update(type(value).__qualname__.encode())
+        for field in fields(value):
+            _feed(digest, (field.name, getattr(value, field.name)))
+    elif isinstance(value, Mapping):
+        _feed(digest, sorted(value.items(), key=lambda item: str(item[0])))
+    elif isinstance(value, tuple | list):
+        for item in value:
+            _feed(digest, item)
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        digest.update(repr(float(value)).encode())
+    elif hasattr(value, "__code__"):
+        digest.update(value.__code__.co_code + repr(value.__code__.co_consts).encode())
+    elif hasattr(value, "__dict__"):
+        digest.update(type(value).__qualname__.encode())
+        _feed(digest, vars(value))
+    else:
+        digest.update(repr(value).encode())

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from dolfin_tongue.arrays import IntArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import BadScene, listing
-from dolfin_tongue.term import Support, Term
+from dolfin_tongue.term import EnergyTerm, Support, Term
 
 #: Break points closer than this are one, s.
 SAME_TIME = 1e-9
@@ -36,6 +38,12 @@ class Scene:
     supports: tuple[Support, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.body, Body):
+            raise BadScene(f"a scene needs a Body, not {self.body!r}; published_tongue() reads one")
+        for name in ("terms", "supports"):
+            if not isinstance(getattr(self, name), tuple | list):
+                raise BadScene(f"`{name}` must be a tuple, e.g. (ReportTissue(),)")
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         if not self.terms:
             raise BadScene("a scene needs at least one term, e.g. ReportTissue()")
         for term in self.terms:
@@ -84,10 +92,28 @@ class Scene:
 
     def check_static(self) -> None:
         """Raise BadScene if the supports leave rigid motions free (statics would be singular)."""
-        held = self.body.points[self.held_nodes]
+        if not any(isinstance(term, EnergyTerm) and term.elastic for term in self.terms):
+            raise BadScene(
+                "a static problem needs tissue that resists: add a passive law, e.g. ReportTissue()"
+            )
+        pieces, number = self._pieces()
+        for piece in range(number):
+            self._check_held(self.held_nodes[pieces[self.held_nodes] == piece], number)
+
+    def _pieces(self) -> tuple[IntArray, int]:
+        """Return the connected piece of each node, and how many pieces there are."""
+        first = np.repeat(self.body.cells[:, :1], 8, axis=1).ravel()
+        pairs = (np.ones(len(first)), (first, self.body.cells.ravel()))
+        size = len(self.body.points)
+        number, pieces = connected_components(coo_array(pairs, shape=(size, size)), directed=False)
+        return pieces, number
+
+    def _check_held(self, nodes: IntArray, pieces: int) -> None:
+        held = self.body.points[nodes]
         if len(held) < 3 or np.linalg.matrix_rank(held - held.mean(axis=0), tol=1e-9) < 2:
             raise BadScene(
-                f"a static problem needs attachments that hold the body: {len(held)} node(s) are "
+                f"a static problem needs attachments that hold "
+                f"{'the body' if pieces == 1 else 'each of its pieces'}: {len(held)} node(s) are "
                 "held, three that do not lie on one line are needed. Add Attached(region) to "
                 f"`supports`; regions: {', '.join(sorted(self.body.node_sets)) or '(none)'}"
             )

@@ -42,7 +42,7 @@ def _jacobians(points: FloatArray, cells: IntArray, xi: FloatArray) -> FloatArra
 
 
 def _determinants(matrices: FloatArray) -> FloatArray:
-    """Determinants of 3x3 matrices, shape (...); faster than a LAPACK call for each."""
+    """Take determinants of 3x3 matrices, shape (...); faster than a LAPACK call for each."""
     a, b, c = matrices[..., 0, :], matrices[..., 1, :], matrices[..., 2, :]
     return (
         a[..., 0] * (b[..., 1] * c[..., 2] - b[..., 2] * c[..., 1])

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import ufl
 
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.errors import OutOfRange, require_not_negative, require_positive
+from dolfin_tongue.errors import OutOfRange
 from dolfin_tongue.kinematics import Expr, Kinematics
 
 
@@ -64,6 +64,9 @@ class Term(ABC):
 
 class EnergyTerm(Term):
     """A term that derives from an energy density W; its first Piola-Kirchhoff stress is dW/dF."""
+
+    #: Whether it resists deformation, so that a static body has an equilibrium.
+    elastic: ClassVar[bool] = True
 
     @abstractmethod
     def energy_density(self, kin: Kinematics, fields: Fields) -> Expr:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import csv
 import json
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,13 +21,11 @@ from typing import Any, Literal
 import meshio
 import numpy as np
 
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import TISSUE_DENSITY, Body
-from dolfin_tongue.errors import BadMesh, OutOfRange
-from dolfin_tongue.fibres import Fibres, FloatArray, IntArray, MuscleFibres
+from dolfin_tongue.errors import BadMesh, OutOfRange, TongueError
+from dolfin_tongue.fibres import SPECIFIC_TENSION, Fibres, MuscleFibres
 from dolfin_tongue.units import kPa
-
-#: Largest active stress at which fibre density 1 is meant, Pa: 22 N/cm2 as in Buchaillard 2009.
-MAX_STRESS = 220.0 * kPa
 
 #: Files of the folder.
 FILES = ("tongue.vtu", "muscles.json", "attachments.json")
@@ -47,7 +46,7 @@ def published_tongue(folder: Path | str, muscles: Literal["groups", "bundles"] =
         Node sets ``jaw``, ``hyoid`` (the attachments), ``midsagittal`` (nodes at y = 0),
         ``midsagittal_contour`` (ordered, from the jaw over tip and dorsum to the hyoid) and
         ``surface``; landmarks ``tip``, ``top`` (also as ``dorsum``) and ``base``. The fibre density
-        makes `MAX_STRESS` times density times the cross-section of a bundle in the mesh its
+        makes `SPECIFIC_TENSION` times density times the cross-section of a bundle in the mesh its
         published largest force.
 
     Raises
@@ -59,6 +58,18 @@ def published_tongue(folder: Path | str, muscles: Literal["groups", "bundles"] =
     if muscles not in ("groups", "bundles"):
         raise OutOfRange("muscles", repr(muscles), "'groups' or 'bundles'")
     folder = _checked(Path(folder), FILES)
+    try:
+        return _read(folder, muscles)
+    except (meshio.ReadError, ET.ParseError, ValueError, KeyError, TypeError) as error:
+        if isinstance(error, TongueError):
+            raise
+        raise BadMesh(
+            f"{folder} does not hold a published tongue as expected: {error!r}"
+        ) from error
+
+
+def _read(folder: Path, muscles: str) -> Body:
+    """Read the three files of a folder."""
     mesh = meshio.read(folder / "tongue.vtu")
     if "hexahedron" not in mesh.cells_dict:
         raise BadMesh(f"{folder / 'tongue.vtu'} has no hexahedra, only {list(mesh.cells_dict)}")
@@ -129,9 +140,9 @@ def _merge(name: str, bundles: Sequence[Mapping[str, Any]]) -> MuscleFibres:
 
 
 def _density(bundle: Mapping[str, Any]) -> FloatArray:
-    """Fibre density in a bundle's cells: largest force over mesh cross-section over MAX_STRESS."""
+    """Fibre density in a bundle's cells: largest force over cross-section and tension."""
     stress = bundle["max_force_over_mesh_csa_kPa"] * kPa
-    return np.full(len(bundle["elements"]), stress / MAX_STRESS)
+    return np.full(len(bundle["elements"]), stress / SPECIFIC_TENSION)
 
 
 @dataclass(frozen=True)
@@ -184,7 +195,7 @@ def read_activations(path: Path | str) -> ActivationTable:
     ------
     FileNotFoundError : no such file; the message lists the tables beside it.
     OutOfRange : times that do not increase, activations outside [0, 1] or not a number.
-    ValueError : another first column than ``time_s``, a row of another length, or an entry that
+    BadMesh : another first column than ``time_s``, a row of another length, or an entry that
         is not a number.
     """
     path = Path(path)
@@ -195,9 +206,9 @@ def read_activations(path: Path | str) -> ActivationTable:
         lines = [line for line in csv.reader(file) if line]
     header, rows = (lines[0], lines[1:]) if lines else ([""], [])
     if header[0] != "time_s":
-        raise ValueError(f"{path}: the first column must be time_s, not {header[0]!r}")
+        raise BadMesh(f"{path}: the first column must be time_s, not {header[0]!r}")
     uneven = [i for i, row in enumerate(rows) if len(row) != len(header)]
     if uneven:
-        raise ValueError(f"{path}: row {uneven[0]} has not {len(header)} entries")
+        raise BadMesh(f"{path}: row {uneven[0]} has not {len(header)} entries")
     table = np.array(rows, dtype=float).reshape(-1, len(header))
     return ActivationTable(table[:, 0], tuple(header[1:]), table[:, 1:])

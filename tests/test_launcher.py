@@ -5,6 +5,7 @@ the test: neither an engine nor a display of the caller's.
 """
 
 import ast
+import itertools
 import os
 import re
 import subprocess
@@ -21,6 +22,7 @@ DOCKERFILE = TOP / "Dockerfile"
 # The Debian package that brings each module, itself or by what it depends on.
 PACKAGE_OF = {
     "basix": "python3-dolfinx-real",
+    "click": "python3-typer",
     "dolfinx": "python3-dolfinx-real",
     "ffcx": "python3-dolfinx-real",
     "gmsh": "python3-gmsh",
@@ -126,7 +128,15 @@ def test_caches_threads_and_directory(tmp_path):
     seen = ast.literal_eval(inside.stdout)
     assert seen["OMP_NUM_THREADS"] == "3"
     assert seen["cwd"] == str(TOP / "tests")
-    assert ast.literal_eval(direct("python", "-c", code, cwd=tmp_path).stdout)["cwd"] == str(TOP)
+    assert ast.literal_eval(direct("python", "-c", code, cwd=tmp_path).stdout)["cwd"] == str(
+        tmp_path
+    )
+
+
+def test_tests_run_in_the_checkout(play, tmp_path):
+    path = play(python3="pwd")
+    assert direct("test", path=path, cwd=tmp_path).stdout.strip() == str(TOP)
+    assert direct("test", path=path, cwd=TOP / "tests").stdout.strip() == str(TOP / "tests")
 
 
 def test_data_folder_becomes_a_full_path(tmp_path):
@@ -144,6 +154,29 @@ def test_data_folder_becomes_a_full_path(tmp_path):
     )
     data = str(tmp_path / "data")
     assert ast.literal_eval(done.stdout) == [data, "--data", data, f"--data={data}"]
+
+
+@pytest.mark.parametrize("option", [["--data", "data"], ["--data=data"]])
+def test_data_before_a_program_becomes_the_variable(tmp_path, option):
+    (tmp_path / "data").mkdir()
+    code = "import os, sys; print([os.environ['DOLFIN_TONGUE_DATA'], *sys.argv[1:]])"
+    done = direct("python", *option, "-c", code, "x", cwd=tmp_path)
+    assert ast.literal_eval(done.stdout) == [str(tmp_path / "data"), "x"]
+    done = direct("shell", *option, "-c", "echo $DOLFIN_TONGUE_DATA", cwd=tmp_path)
+    assert done.stdout.strip() == str(tmp_path / "data")
+
+
+def test_results_folder_is_made_where_the_caller_is(play, tmp_path):
+    path = play(python3='for argument; do echo "$argument"; done')
+    done = direct("demo", "--results", "a/b", "--results=c", path=path, cwd=tmp_path)
+    made = [tmp_path / "a" / "b", tmp_path / "c"]
+    assert done.stdout.splitlines()[-3:] == ["--results", str(made[0]), f"--results={made[1]}"]
+    assert all(folder.is_dir() for folder in made)
+
+    (tmp_path / "file").touch()
+    done = direct("demo", "--results", "file/below", path=path, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "Not a directory" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -246,7 +279,7 @@ def test_what_a_container_gets(play, tmp_path, info, user):
         CI="1",
     )
     words = done.stdout.splitlines()
-    for mount in [f"{TOP}:{TOP}", f"{cache}:{cache}", f"{data}:{data}:ro"]:
+    for mount in [f"{TOP}:{TOP}:rw", f"{cache}:{cache}:rw", f"{data}:{data}:ro"]:
         assert words[words.index(mount) - 1] == "--volume"
     assert words[words.index("--user") + 1] == user
     assert {
@@ -256,6 +289,43 @@ def test_what_a_container_gets(play, tmp_path, info, user):
         "CI=1",
     } <= set(words)
     assert words[-4:] == [str(LAUNCHER), "demo", "--data", str(data)]
+
+
+def _mounts(done):
+    words = done.stdout.splitlines()
+    return [after for word, after in itertools.pairwise(words) if word == "--volume"]
+
+
+def test_what_a_container_gets_of_folders_outside(play, tmp_path):
+    here, results = tmp_path / "here", tmp_path / "results"
+    here.mkdir()
+    path = play(docker=ENGINE.format(info="", missing=0, output="", code=0))
+    options = ["--results", "../results", "--results=.", "--data=.", "--data", ".."]
+    done = tongue("demo", *options, path=path, cwd=here)
+    assert _mounts(done) == [
+        f"{TOP}:{TOP}:rw",
+        f"{here}:{here}:rw",
+        f"{results}:{results}:rw",
+        f"{tmp_path}:{tmp_path}:ro",
+    ]
+    words = done.stdout.splitlines()
+    assert words[words.index("-C") + 1] == str(here)
+    assert words[-6:-3] == ["--results", str(results), f"--results={here}"]
+
+    for arguments in [["test"], ["demo", "--results", str(TOP / "results")]]:
+        done = tongue(*arguments, path=path, cwd=TOP if arguments[0] == "demo" else here)
+        assert _mounts(done) == [f"{TOP}:{TOP}:rw"]
+
+
+@pytest.mark.parametrize("folder", ["/", "/usr", "/etc", "/tmp"])
+def test_folders_of_the_system_are_refused(play, tmp_path, folder):
+    path = play(docker=ENGINE.format(info="", missing=0, output="", code=0))
+    done = tongue("python", path=path, cwd=folder, DOLFIN_TONGUE_CACHE=str(tmp_path))
+    assert done.returncode == 1
+    assert f"{folder} belongs to the system" in done.stderr
+    done = tongue("demo", "--results", folder, path=path, cwd=tmp_path)
+    assert done.returncode == 1
+    assert tongue("test", path=path, cwd=folder).returncode == 0
 
 
 def test_a_failing_build_shows_the_end_of_its_log_and_a_hint(play, tmp_path):

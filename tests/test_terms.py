@@ -322,7 +322,7 @@ def test_static_active_stress_is_that_of_a_standing_muscle():
     body = block_body((0.03, 0.02, 0.02), (2, 2, 1), muscles=MUSCLES)
     from dolfin_tongue.boundary import Attached
 
-    scene = Scene(body, (TERMS["active"],), (Attached("x0"),))
+    scene = Scene(body, (TERMS["report"], TERMS["active"]), (Attached("x0"),))
     dynamic, static = System(scene, True), System(scene, False)
     y, v, _ = random_states(dynamic)
     first = residual(dynamic, y, 0 * v, 0 * v)

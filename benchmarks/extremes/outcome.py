@@ -185,6 +185,7 @@ def attempt_march(
     folder: Path | None = None,
     start: State | None = None,
     limit: float = 60.0,
+    most: int | None = None,
 ) -> tuple[Outcome, list[State]]:
     """Run a scene by stepping through it here, with either solver.
 
@@ -196,6 +197,7 @@ def attempt_march(
     folder : for the tables of the run; None for no files.
     start : state to start from; default: at rest in the reference configuration.
     limit : wall time after which the run is given up, s.
+    most : accepted steps after which it is given up.
 
     Returns
     -------
@@ -213,8 +215,8 @@ def attempt_march(
             energies.append(energy)
             if recorder:
                 recorder.record(state, {"max_volume_change": volume, "energy_J": energy})
-            if clock.perf_counter() - begin > limit and state.time < end:
-                raise GivenUp(f"given up after {limit:g} s of wall time")
+            if state.time < end:
+                _give_up(clock.perf_counter() - begin, limit, len(states), most)
     except GivenUp as error:
         kind, cause = "throttled", f"{error}, at a step of {states[-1].step:.1e} s"
     except NotConverged as error:
@@ -229,6 +231,14 @@ def attempt_march(
     outcome = _from_states(scene, states, kind, cause)
     outcome.energies, outcome.wall = np.array(energies), clock.perf_counter() - begin
     return _judged(outcome, end), states
+
+
+def _give_up(wall: float, limit: float, steps: int, most: int | None) -> None:
+    """Raise GivenUp for a run that takes too long or too many steps."""
+    if wall > limit:
+        raise GivenUp(f"given up after {limit:g} s of wall time")
+    if most and steps > most:
+        raise GivenUp(f"given up after {most} steps")
 
 
 def _observed(

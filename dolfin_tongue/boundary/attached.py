@@ -8,6 +8,7 @@ import numpy as np
 
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
+from dolfin_tongue.errors import BadScene
 from dolfin_tongue.term import Support
 
 
@@ -23,6 +24,8 @@ class Attached(Support):
     regions: tuple[str, ...]
 
     def __init__(self, *regions: str):
+        if not regions or not all(isinstance(region, str) for region in regions):
+            raise BadScene(f'Attached takes names, e.g. Attached("jaw", "hyoid"), not {regions}')
         object.__setattr__(self, "regions", regions)
 
     def nodes(self, body: Body) -> IntArray:

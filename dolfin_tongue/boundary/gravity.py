@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import ufl
 
@@ -22,6 +23,7 @@ class Gravity(EnergyTerm):
     acceleration : g, m/s2, three components.
     """
 
+    elastic: ClassVar[bool] = False
     acceleration: tuple[float, float, float] = (0.0, 0.0, -STANDARD_GRAVITY)
 
     def __post_init__(self) -> None:

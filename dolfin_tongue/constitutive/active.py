@@ -14,13 +14,10 @@ import ufl
 from dolfin_tongue.body import Body
 from dolfin_tongue.control import Control
 from dolfin_tongue.control.sources import require_activation
-from dolfin_tongue.errors import BadScene, OutOfRange
+from dolfin_tongue.errors import BadScene, OutOfRange, require_positive
+from dolfin_tongue.fibres import SPECIFIC_TENSION
 from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.term import Fields, Term, require_positive
-
-#: Specific tension of muscle, Pa: 22 N/cm2, with which Buchaillard, Perrier and Payan (2009,
-#: J. Acoust. Soc. Am. 126:2033-2051) turn cross-sections of tongue muscles into forces.
-SPECIFIC_TENSION = 220e3
+from dolfin_tongue.term import Fields, Term
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import ufl
 
 from dolfin_tongue.body import Body
+from dolfin_tongue.errors import require_not_negative, require_positive
 from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.term import EnergyTerm, Fields, require_not_negative, require_positive
+from dolfin_tongue.term import EnergyTerm, Fields
 
 
 def strain_invariants(strain: Expr) -> tuple[Expr, Expr]:

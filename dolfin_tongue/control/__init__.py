@@ -1,5 +1,13 @@
 """Activation sources."""
 
-from dolfin_tongue.control.sources import Constant, Control, Ramp, SmoothRamp, Step, Table, require_activation
+from dolfin_tongue.control.sources import (
+    Constant,
+    Control,
+    Ramp,
+    SmoothRamp,
+    Step,
+    Table,
+    require_activation,
+)
 
 __all__ = ["Constant", "Control", "Ramp", "SmoothRamp", "Step", "Table", "require_activation"]

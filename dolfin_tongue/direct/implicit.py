@@ -39,9 +39,8 @@ from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
 from dolfin_tongue.direct.saddle import Saddle, Solver
 from dolfin_tongue.direct.trouble import lost
-from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.errors import OutOfRange, require_positive
 from dolfin_tongue.state import State
-from dolfin_tongue.term import require_positive
 
 #: Implicit coefficient d, place 2 d of the inner stage, weight w of the first two stages.
 D = 1.0 - 1.0 / sqrt(2.0)

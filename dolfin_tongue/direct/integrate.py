@@ -19,10 +19,9 @@ from dolfin_tongue.direct.limits import Limit, StabilityLimits
 from dolfin_tongue.direct.model import Model, Problem, problem_of
 from dolfin_tongue.direct.multipliers import Acceleration
 from dolfin_tongue.direct.trouble import lost
-from dolfin_tongue.errors import NotConverged, OutOfRange
+from dolfin_tongue.errors import NotConverged, OutOfRange, require_positive
 from dolfin_tongue.scene import SAME_TIME, Scene
 from dolfin_tongue.state import State
-from dolfin_tongue.term import require_positive
 
 #: Relative volume change of a cell at which an explicit run is given up.
 LOST_VOLUME = 0.05

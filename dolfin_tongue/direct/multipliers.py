@@ -48,8 +48,7 @@ from scipy.sparse.linalg import splu
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.direct import points
 from dolfin_tongue.direct.model import Model
-from dolfin_tongue.errors import OutOfRange
-from dolfin_tongue.term import require_positive
+from dolfin_tongue.errors import OutOfRange, require_positive
 
 #: Free nodes up to which Gamma is kept as a dense matrix.
 DENSE_NODES = 450

@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.errors import NotConverged, OutOfRange
+from dolfin_tongue.errors import NotConverged, OutOfRange, require_positive
 from dolfin_tongue.scene import SAME_TIME, Scene
 from dolfin_tongue.shape import gauss_jacobians
 from dolfin_tongue.solve.failure import where_and_why
@@ -31,7 +31,6 @@ from dolfin_tongue.solve.newton import (
 )
 from dolfin_tongue.state import State
 from dolfin_tongue.system import System
-from dolfin_tongue.term import require_positive
 
 #: Time-stepping methods and the options of TS that choose them, besides the spectral radius.
 METHODS: dict[str, dict[str, float]] = {
@@ -116,21 +115,29 @@ class Dynamics:
     pair : displacement and pressure spaces, see `mesh.PAIRS`.
     """
 
+    newton: Newton
+
     def __init__(self, scene: Scene, steps: TimeSteps | None = None, pair: str = "Q1/P0"):
         self.system = System(scene, dynamic=True, pair=pair)
         self.steps = steps or TimeSteps()
-        self.ts = self._new_ts()
-        self.newton = Newton(self.system, self.ts.getSNES(), self.steps.newton)
-        self.ts.setI2Jacobian(self._jacobian, self.newton.matrix)
-        self.ts.getSNES().setInitialGuess(self._predict)
         self._velocity_before: FloatArray | None = None
         self._stage_pressure_before: FloatArray | None = None
         self._stage_pressure = np.zeros(len(self.system.space.pressure_dofs))
+        self._connect()
+
+    def _connect(self) -> None:
+        """Make TS and Newton; anew after PETSc broke off, since its vectors stay locked."""
+        self.ts = self._new_ts()
+        counts = self.newton.counts if hasattr(self, "newton") else None
+        self.newton = Newton(self.system, self.ts.getSNES(), self.steps.newton, counts)
+        self.ts.setI2Jacobian(self.newton.careful(self._jacobian), self.newton.matrix)
+        function = self.newton.careful(self._function)
+        self.ts.setI2Function(function, PETSc.Vec().createSeq(self.system.space.size))
+        self.ts.getSNES().setInitialGuess(self.newton.careful(self._predict))
 
     def _new_ts(self) -> PETSc.TS:
         ts = PETSc.TS().create(PETSc.COMM_SELF)
         ts.setType("alpha2")
-        ts.setI2Function(self._function, PETSc.Vec().createSeq(self.system.space.size))
         ts.setMaxTime(1e300)  # the end is ours to meet; see `_march_segment`
         ts.setMaxSteps(2**31 - 2)
         ts.setMaxSNESFailures(-1)
@@ -222,10 +229,13 @@ class Dynamics:
         return self.system.state_of(time, zero, zero)
 
     def _set_solution(self, state: State) -> None:
-        solution, rate = (PETSc.Vec().createWithArray(x) for x in self.system.vectors(state))
-        self.ts.setTime(state.time)
+        self._set_vectors(state.time, *self.system.vectors(state))
+
+    def _set_vectors(self, time: float, y: FloatArray, rate: FloatArray) -> None:
+        """Give TS new vectors and let it begin there."""
+        self.ts.setTime(time)
         self.ts.setTimeStep(self.steps.dt)
-        self.ts.setSolution2(solution, rate)
+        self.ts.setSolution2(*(PETSc.Vec().createWithArray(x.copy()) for x in (y, rate)))
         self._restart()
 
     def _restart(self) -> None:
@@ -270,6 +280,10 @@ class Dynamics:
                 raise NotConverged(
                     _name(reason), state.time, where_and_why(body, state.displacement)
                 )
+            if reason == Reason.DIVERGED_LINEAR_SOLVE:
+                self._connect()
+                self._set_vectors(before, *begin)
+                continue
             self._restore(begin, before, rolled_back)
             rolled_back = True
         time = end if abs(self.ts.getTime() - end) <= 1e-9 * dt else self.ts.getTime()
@@ -282,7 +296,8 @@ class Dynamics:
         self.ts.setConvergedReason(PETSc.TS.ConvergedReason.ITERATING)
         try:
             self.ts.step()
-        except PETSc.Error:  # the factorisation broke down: a smaller step has another matrix
+        except PETSc.Error as error:  # the factorisation broke down: a smaller step may do
+            self.newton.reraise(error)
             return Reason.DIVERGED_LINEAR_SOLVE
         reason = self.ts.getSNES().getConvergedReason()
         return INVERTED if reason > 0 and self._inverted() else reason

@@ -15,9 +15,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.errors import OutOfRange, require_positive
 from dolfin_tongue.system import System
-from dolfin_tongue.term import require_positive
 
 Reason = PETSc.SNES.ConvergedReason
 _NAMES = {value: name for name, value in vars(Reason).items() if isinstance(value, int)}
@@ -90,17 +89,48 @@ class Newton:
     system : the equations.
     snes : a new SNES, or the one of a TS.
     tolerances : when it is done.
+    counts : of an earlier one that this one replaces.
     """
 
-    def __init__(self, system: System, snes: PETSc.SNES, tolerances: Tolerances):
+    def __init__(
+        self,
+        system: System,
+        snes: PETSc.SNES,
+        tolerances: Tolerances,
+        counts: tuple[int, int, int] | None = None,
+    ):
         self.system, self.snes, self.tolerances = system, snes, tolerances
         self.matrix = system.new_matrix()
         self._stale = True
         self._key: tuple[float, ...] = ()
         self._step_sizes: list[float] = []
-        self.residuals = self.iterations = self.factorisations = 0
+        self.residuals, self.iterations, self.factorisations = counts or (0, 0, 0)
+        self._raised: BaseException | None = None
         self._displacement_dofs = system.space.all_displacement_dofs.ravel()
-        snes.setConvergenceTest(self._converged)
+        snes.setConvergenceTest(self.careful(self._converged))
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Residuals, iterations and factorisations so far."""
+        return self.residuals, self.iterations, self.factorisations
+
+    def careful(self, callback: Callable) -> Callable:
+        """Remember what a callback of PETSc raises: PETSc reports an error of its own instead."""
+
+        def watched(*arguments: object) -> object:
+            try:
+                return callback(*arguments)
+            except BaseException as error:
+                self._raised = error
+                raise
+
+        return watched
+
+    def reraise(self, error: BaseException) -> None:
+        """Raise what a callback had raised (a user's control, Ctrl-C), if that was the cause."""
+        if self._raised is not None:
+            cause, self._raised = self._raised, None
+            raise cause from error
 
     def renew(self) -> None:
         """Ask for a new factorisation at the next iteration."""

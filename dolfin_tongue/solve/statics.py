@@ -29,6 +29,8 @@ class Statics:
     pair : displacement and pressure spaces, see `mesh.PAIRS`.
     """
 
+    newton: Newton
+
     def __init__(
         self,
         scene: Scene,
@@ -37,13 +39,18 @@ class Statics:
         pair: str = "Q1/P0",
     ):
         self.system = System(scene, dynamic=False, pair=pair)
-        self.time = time
+        self.time, self._tolerances = time, tolerances
+        self._connect()
+
+    def _connect(self) -> None:
+        """Make SNES and its vectors; anew after PETSc broke off, since vectors stay locked."""
         snes = PETSc.SNES().create(PETSc.COMM_SELF)
         set_options(snes, SNES_OPTIONS)
-        self.newton = Newton(self.system, snes, tolerances)
+        counts = self.newton.counts if hasattr(self, "newton") else None
+        self.newton = Newton(self.system, snes, self._tolerances, counts)
         self._solution = PETSc.Vec().createSeq(self.system.space.size)
-        snes.setFunction(self._function, self._solution.duplicate())
-        snes.setJacobian(self._jacobian, self.newton.matrix)
+        snes.setFunction(self.newton.careful(self._function), self._solution.duplicate())
+        snes.setJacobian(self.newton.careful(self._jacobian), self.newton.matrix)
 
     def _function(self, snes: PETSc.SNES, state: PETSc.Vec, out: PETSc.Vec) -> None:
         self.newton.residuals += 1
@@ -102,8 +109,10 @@ class Statics:
         self.newton.renew()
         try:
             self.newton.snes.solve(None, self._solution)
-        except PETSc.Error:  # the factorisation broke down
-            return False, self.newton.snes.getIterationNumber()
+        except PETSc.Error as error:  # the factorisation broke down
+            self.newton.reraise(error)
+            self._connect()
+            return False, 0
         reason = self.newton.snes.getConvergedReason()
         return reason > 0, self.newton.snes.getIterationNumber()
 

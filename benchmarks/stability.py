@@ -1,0 +1,382 @@
+"""What ends badly, and how: a map of dt against stiffness, and a table of extreme scenes.
+
+Every run must finish with volumes kept (largest relative volume change of a cell 1e-8), or end at a
+named time for a named cause with everything before it on disk. Anything else is a fault, counted at
+the end. What needs other programs' files or a published tongue is skipped without them (variable
+DOLFIN_TONGUE_PEERS, option --data). Cheap scenes come first; the files grow while it runs.
+"""
+
+import csv
+import io
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.extremes import charts, peers, scenes
+from benchmarks.extremes.outcome import Outcome, attempt_alpha2, attempt_march, read_table
+from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.control import Ramp, Step
+from dolfin_tongue.demo import Options
+from dolfin_tongue.direct import Adaptive, Implicit, RungeKutta4
+from dolfin_tongue.direct.integrate import Method
+from dolfin_tongue.files import write_json, write_text
+from dolfin_tongue.geometry.preliminary import preliminary_tongue
+from dolfin_tongue.geometry.published import published_tongue
+from dolfin_tongue.scene import Scene
+from dolfin_tongue.scenes import published_scene
+from dolfin_tongue.solve.dynamics import TimeSteps
+from dolfin_tongue.solve.newton import Tolerances
+from dolfin_tongue.solve.statics import Statics
+from dolfin_tongue.state import State
+
+FENICSX, DIRECT = "FEniCSx", "direct"
+AnyMethod = Method | TimeSteps
+
+#: Methods of the map: label, and the method for a step (s).
+MAP_METHODS: dict[str, Callable[[float], AnyMethod]] = {
+    "alpha2, radius 0": lambda dt: TimeSteps(dt, spectral_radius=0.0),
+    "alpha2, radius 0.8": lambda dt: TimeSteps(dt),
+    "alpha2, radius 1": lambda dt: TimeSteps(dt, spectral_radius=1.0),
+    "RungeKutta4": lambda dt: RungeKutta4(dt),
+    "Adaptive (largest dt)": lambda dt: Adaptive(largest=dt),
+    "Implicit": lambda dt: Implicit(dt),
+}
+MAP_END = 0.06
+#: Accepted steps after which a run of the map is given up; the smallest dt takes 600.
+MAP_MOST = 2000
+
+
+def both(dt: float = 5e-3, tolerance: float | None = None) -> tuple[TimeSteps, Implicit]:
+    """Return the method of each solver that is meant for production."""
+    return TimeSteps(dt, tolerance=tolerance), Implicit(dt, tolerance=tolerance)
+
+
+@dataclass
+class Report:
+    """Collects runs, prints them and keeps the files up to date.
+
+    Parameters
+    ----------
+    folder : for ``extremes.csv``, ``extremes.json`` and the folders of the runs.
+    rows : one per run.
+    """
+
+    folder: Path
+    rows: list[dict] = field(default_factory=list)
+    begin: float = field(default_factory=clock.perf_counter)
+
+    def runs(
+        self, name: str, scene: Scene, end: float, methods: Sequence[AnyMethod] | None = None
+    ) -> None:
+        """Attempt a scene with several methods, each in a folder of its own."""
+        for method in both() if methods is None else methods:
+            self.add(name, method, self.attempt(name, scene, end, method))
+
+    def attempt(self, name: str, scene: Scene, end: float, method: AnyMethod) -> Outcome:
+        """Attempt one run, without a row; FEniCSx by `run.simulate`."""
+        if isinstance(method, TimeSteps):
+            return attempt_alpha2(scene, end, self.run_folder(name, method), method)
+        return attempt_march(scene, end, method, self.run_folder(name, method))[0]
+
+    def run_folder(self, name: str, method: AnyMethod) -> Path:
+        """Folder of a run."""
+        words = "".join(c if c.isalnum() or c == "." else " " for c in name).split()
+        return self.folder / "_".join(words) / solver_of(method)
+
+    def add(self, name: str, method: AnyMethod, outcome: Outcome, note: str = "") -> None:
+        """Take up the outcome of a run."""
+        numbers = {
+            "time_s": outcome.time, "steps": outcome.steps, "max_volume_change": outcome.volume,
+            "wall_s": outcome.wall,
+        }  # fmt: skip
+        self.row(name, solver_of(method), outcome.short, note, outcome.kind, numbers, outcome.cause)
+
+    def row(
+        self, name: str, solver: str, text: str, note: str = "", kind: str = "solved",
+        numbers: dict[str, float] | None = None, cause: str = "",
+    ) -> None:  # fmt: skip
+        """Add a row, print it, and write the files anew."""
+        blank = dict.fromkeys(("time_s", "steps", "max_volume_change", "wall_s"))
+        row = {"scene": name, "solver": solver, "outcome": text, "note": note, "kind": kind}
+        self.rows.append(row | (numbers or blank) | {"cause": cause})
+        elapsed = clock.perf_counter() - self.begin
+        print(f"{elapsed:5.0f} s  {name} | {solver}: {text}; {note}".rstrip("; "), flush=True)
+        write_csv(self.folder / "extremes.csv", self.rows)
+        write_json(self.folder / "extremes.json", self.rows)
+
+    def table(self) -> dict[str, dict[str, str]]:
+        """One row per scene, one column per solver."""
+        table: dict[str, dict[str, str]] = {}
+        for row in self.rows:
+            cells = table.setdefault(row["scene"], {FENICSX: "", DIRECT: "", "note": ""})
+            cells[row["solver"]] = row["outcome"]
+            if row["note"] not in cells["note"]:
+                cells["note"] = f"{cells['note']}; {row['note']}".strip("; ")
+        return table
+
+
+def solver_of(method: AnyMethod) -> str:
+    """Which solver a method belongs to."""
+    return FENICSX if isinstance(method, TimeSteps) else DIRECT
+
+
+def write_csv(path: Path, rows: list[dict]) -> None:
+    """Write rows with the keys of the first as columns."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
+
+
+# -- extreme scenes --------------------------------------------------------------------------------
+
+
+def blocks(report: Report) -> None:
+    """Small blocks: bad cells, overflow, inversion, constraint time constant."""
+    block = scenes.muscle_block(viscosity=1.0)
+    for tau, dt in ((1e-3, 1e-4), (1e-4, 1e-4), (1e-5, 1e-4), (1e-5, 2e-5)):
+        name = f"time constant {tau:g} s, Runge-Kutta 4 at {1e3 * dt:g} ms"
+        report.runs(name, block, 0.06, [RungeKutta4(dt, tau)])
+    report.runs("time constant 1e-05 s, adaptive pair", block, 0.06, [Adaptive(tau=1e-5)])
+    bad = scenes.muscle_block(body=scenes.bad_block())
+    report.runs("cells of 5 % scaled Jacobian", bad, 0.3)
+    report.runs("pulled to 12 times its length: (67) overflows", scenes.driven_block(0.33, 3), 3)
+    report.runs("the same in one step", scenes.driven_block(0.33, 1e-4), 0.1)
+    report.runs("hung in 10 000 g", scenes.flung_block(1e5), 0.1)
+    report.runs("hung in 1 000 000 g", scenes.flung_block(1e7), 0.1)
+    report.runs("cells driven to inversion", scenes.driven_block(-0.035), 0.1)
+
+
+def tongues(report: Report) -> None:
+    """Run the report's tongue under extreme loads, laws and steps."""
+    body = preliminary_tongue()
+    sudden = scenes.tongue(body, Step(1.0, 0.1))
+    report.runs("all muscles 0 to 100 % in one step", sudden, 0.4)
+    report.runs("the same, steps adapted to 0.01 mm", sudden, 0.4, both(tolerance=1e-5))
+    report.runs("no activity, gravity", scenes.tongue(body), 0.5)
+    half = scenes.half_active()
+    for name, change in (
+        ("passive modulus x 1000", {"factor": 1e3}),
+        ("passive modulus / 1000", {"factor": 1e-3}),
+        ("viscosity x 1000", {"viscosity": 6e4}),
+        ("gravity x 50", {"gravity": 490.5}),
+    ):
+        report.runs(name, scenes.tongue(body, half, **change), 0.4)
+    for dt in (20e-3, 50e-3):
+        report.runs(f"dt {1e3 * dt:g} ms", scenes.tongue(body, half), 0.5, both(dt))
+
+
+def rests(report: Report) -> None:
+    """10 s of rest: without load, from the equilibrium under gravity, and sagging into it."""
+    body = preliminary_tongue()
+    hanging = scenes.tongue(body)
+    rest = Statics(hanging, Tolerances(1e-12, 1e-12, renew_above=0.0)).solve()
+    start = State(0.0, rest.displacement, rest.velocity, rest.pressure)
+    for name, scene, begin in (
+        ("10 s of rest without load", scenes.tongue(body, gravity=0.0), None),
+        ("10 s of rest under gravity", hanging, start),
+        ("10 s of sagging to rest", hanging, None),
+    ):
+        for method in both():
+            folder = report.run_folder(name, method)
+            outcome, states = attempt_march(scene, 10.0, method, folder, begin)
+            tip = rest.displacement[body.landmark("tip")] if scene is hanging else 0.0
+            late = outcome.times >= (0.0 if begin or scene is not hanging else 5.0)
+            drift = np.linalg.norm(end_path(scene, states, "tip")[late] - tip, axis=1)
+            note = f"{solver_of(method)}: tip within {drift.max(initial=0.0):.0e} m of equilibrium"
+            report.add(name, method, outcome, note + (" after 5 s" if not late.all() else ""))
+
+
+def end_path(scene: Scene, states: Sequence[State], landmark: str) -> FloatArray:
+    """Displacement of a landmark over a motion, shape (states, 3), m."""
+    node = scene.body.landmark(landmark)
+    return np.array([state.displacement[node] for state in states]).reshape(-1, 3)
+
+
+# -- against FEBio ---------------------------------------------------------------------------------
+
+
+def swings(report: Report) -> None:
+    """Swing FEBio's undamped block for 10 s at 5 ms, and see whether its energy grows."""
+    scene = scenes.febio_dynamic((8, 4, 4), active=False)
+    scale = 0.0
+    methods = [TimeSteps(5e-3, spectral_radius=radius) for radius in (1.0, 0.9, 0.8)]
+    for method in (*methods, Implicit(5e-3)):
+        kind = f"radius {method.spectral_radius}" if isinstance(method, TimeSteps) else "TR-BDF2"
+        name = f"undamped block for 10 s, {kind}"
+        outcome = report.attempt(name, scene, 10.0, method)
+        if not scale:
+            steps = read_table(report.run_folder(name, method) / "steps.csv")
+            scale = steps["kinetic_J"].max()
+        growth, last = (100 * x / scale for x in (outcome.energies.max(), outcome.energies[-1]))
+        note = f"energy grows by {growth:.2g} % at most, is {last:+.3g} % at the end"
+        report.add(name, method, outcome, note)
+
+
+def contractions(report: Report) -> None:
+    """FEBio's block under 20 kPa along z ramped over 50 ms, at steps of which FEBio dies."""
+    for (cells, ms), died in peers.DEATHS.items():
+        name = f"20 kPa across, {'x'.join(map(str, cells))}, dt {ms} ms"
+        scene = scenes.febio_dynamic(cells, active=True)
+        for method in both(1e-3 * ms):
+            outcome = report.attempt(name, scene, 0.5, method)
+            report.add(name, method, outcome, f"FEBio dies at {died:g} s")
+
+
+def febio_statics(report: Report) -> None:
+    """Compare static answers with FEBio's."""
+    folder = peers.febio_folder()
+    for (material, angle), expected in peers.STATIC.items():
+        scene = scenes.febio_static(material, angle)
+        state = Statics(scene).solve()
+        end = 1e3 * state.displacement[scene.body.nodes("x1")].mean(axis=0)[:2]
+        off = np.linalg.norm(end - expected) / np.linalg.norm(expected)
+        note = f"end moves {end[0]:.4f} {end[1]:.4f} mm, FEBio's {expected[0]:.4f} "
+        note += f"{expected[1]:.4f}: {100 * off:.2f} %"
+        if folder:
+            note += f"; any node {_node_distance(folder, scene, state, material, angle)}"
+        report.row(f"static {material}, fibres at {angle:.0f} deg", FENICSX, "solved", note)
+    for cells, sag in peers.SAG.items():
+        scene = scenes.febio_dynamic(cells, active=False)
+        ours = Statics(scene).solve().displacement[scene.body.nodes("x1"), 0].mean()
+        note = f"end sags {1e3 * ours:.5f} mm, FEBio's {1e3 * sag:.5f}: "
+        note += f"{100 * abs(ours / sag - 1):.2f} %"
+        report.row(f"static sag, {'x'.join(map(str, cells))}", FENICSX, "solved", note)
+
+
+def _node_distance(folder: Path, scene: Scene, state: State, material: str, angle: float) -> str:
+    """Largest distance of any node from FEBio's, over the largest displacement."""
+    before, after = peers.end_positions(folder, material, angle)
+    order, theirs = (np.lexsort(np.round(1e9 * x).T) for x in (scene.body.points, before))
+    gap = (scene.body.points + state.displacement)[order] - after[theirs]
+    largest = np.linalg.norm(state.displacement, axis=1).max()
+    return f"{100 * np.linalg.norm(gap, axis=1).max() / largest:.2f} %"
+
+
+def febio_curves(report: Report) -> None:
+    """Compare paths of the end face over 0.1 s at dt 0.25 ms with FEBio's at the same dt."""
+    folder = peers.febio_folder()
+    if folder is None:
+        print(f"FEBio's curves: skipped, {peers.VARIABLE} names no folder with febio/", flush=True)
+        return
+    for cells, load in (((4, 2, 2), "grav"), ((8, 4, 4), "grav"), ((4, 2, 2), "act20k")):
+        scene = scenes.febio_dynamic(cells, active=load == "act20k")
+        times, expected = peers.end_face(folder, cells, load)
+        face = scene.body.nodes("x1")
+        for method in (TimeSteps(2.5e-4, spectral_radius=1.0), Implicit(2.5e-4)):
+            outcome, states = attempt_march(scene, 0.1, method)
+            ours = np.array([s.displacement[face, 0].mean() for s in states])
+            gap = np.abs(ours - np.interp(outcome.times, times, expected))
+            reach = np.abs(expected[times <= 0.1]).max()
+            parts = [gap[outcome.times <= t].max() / reach for t in (0.02, 0.05, 0.1)]
+            off = " ".join(f"{100 * part:.2g} %" for part in parts)
+            note = f"{solver_of(method)}: off by {off} of the reach until 20, 50, 100 ms"
+            name = f"FEBio's {load}, {'x'.join(map(str, cells))}, dt 0.25 ms"
+            report.add(name, method, outcome, note)
+
+
+# -- published tongue ------------------------------------------------------------------------------
+
+
+def published(report: Report, data: Path | None) -> None:
+    """Every muscle of the published tongue at 100 %, ramped over 50 ms, under gravity."""
+    if data is None:
+        print("published tongue: skipped, no --data", flush=True)
+        return
+    body = published_tongue(data)
+    for muscle in body.fibres.names:
+        died = peers.ARTISYNTH_DEATHS.get(muscle)
+        note = f"ArtiSynth dies at dt {died}" if died else ""
+        scene = published_scene(data, {muscle: Ramp(1.0, 0.0, 0.05)}, body)
+        name = f"published tongue, {muscle} 100 %"
+        for method in both():
+            report.add(name, method, report.attempt(name, scene, 0.2, method), note)
+
+
+# -- the map ---------------------------------------------------------------------------------------
+
+
+def stiffness_map(folder: Path) -> list[charts.Point]:
+    """Run the block at every dt, stiffness and viscosity with every method."""
+    points: list[charts.Point] = []
+    for axis, values in charts.AXES.items():
+        for value in values:
+            scene = scenes.muscle_block(**{axis: value})
+            _, states = attempt_march(scene, MAP_END, Implicit(5e-5, newton=1e-9))
+            fine = np.array([s.time for s in states]), end_path(scene, states, "end")
+            part = [
+                _map_point(scene, fine, method, axis, value, dt)
+                for method in MAP_METHODS
+                for dt in charts.MAP_STEPS
+            ]
+            points += part
+            write_csv(folder / "map.csv", [asdict(point) for point in points])
+            print(f"       map, {axis} {value:g}: {charts.counted(part)}", flush=True)
+    charts.draw_map(points, list(MAP_METHODS), folder / "stability.png")
+    return points
+
+
+def _map_point(
+    scene: Scene, fine: tuple[FloatArray, FloatArray], method: str, axis: str, value: float,
+    dt: float,
+) -> charts.Point:  # fmt: skip
+    """One run of the map, compared with the path at a small step."""
+    outcome, states = attempt_march(scene, MAP_END, MAP_METHODS[method](dt), most=MAP_MOST)
+    path = end_path(scene, states, "end")
+    error = charts.path_error(outcome.times, path, fine) if states else np.nan
+    return charts.Point(
+        method, axis, value, dt, outcome.kind, outcome.cause, error, outcome.steps, outcome.wall,
+        outcome.volume,
+    )  # fmt: skip
+
+
+def map_rows(points: list[charts.Point]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Per method and axis: how many runs ended how, and how many paths are right."""
+    for method in MAP_METHODS:
+        for axis in charts.AXES:
+            part = [p for p in points if (p.method, p.axis) == (method, axis)]
+            alive = [p for p in part if p.kind in ("finished", "drifted")]
+            good = sum(p.error <= charts.POOR for p in alive)
+            note = f"{good} of {len(part)} right to {100 * charts.POOR:.0f} %"
+            worst = max((p.error for p in alive), default=np.nan)
+            note += f"; the worst that finished is off by {100 * worst:.0f} %"
+            solver = FENICSX if method.startswith("alpha2") else DIRECT
+            cells = {FENICSX: "", DIRECT: "", "note": note} | {solver: charts.counted(part)}
+            yield f"map, {axis}: {method}", cells
+
+
+def markdown(table: dict[str, dict[str, str]]) -> str:
+    """Return the table for the documentation."""
+    columns = list(next(iter(table.values())))
+    lines = ["| scene | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
+    lines += [f"| {name} | " + " | ".join(row.values()) + " |" for name, row in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def verdict(rows: list[dict], points: list[charts.Point]) -> str:
+    """Count what must not be."""
+    kinds = [row["kind"] for row in rows], [point.kind for point in points]
+    parts = (
+        f"{len(part)} {what}: {part.count('fault')} faults, {part.count('drifted')} with volumes "
+        "kept worse than to 1e-8"
+        for part, what in zip(kinds, ("runs", "runs of the map"), strict=True)
+    )
+    return "; ".join(parts)
+
+
+def main(options: Options) -> dict[str, object]:
+    """Run the benchmark; returns the table."""
+    options.folder.mkdir(parents=True, exist_ok=True)
+    report = Report(options.folder)
+    for part in (blocks, tongues, febio_statics, contractions, rests, febio_curves, swings):
+        part(report)
+    published(report, options.data)
+    points = stiffness_map(options.folder)
+    table = report.table() | dict(map_rows(points))
+    table["faults"] = {FENICSX: "", DIRECT: "", "note": verdict(report.rows, points)}
+    write_text(options.folder / "table.md", markdown(table))
+    return dict(table)
