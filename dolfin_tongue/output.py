@@ -54,6 +54,8 @@ class Table:
         """Keep the rows of an earlier run up to a time (first column, s)."""
         with self.path.open(newline="", encoding="utf-8") as file:
             header, *rows = list(csv.reader(file))
+        if header[:1] != ["time_s"] or not rows:
+            raise ValueError(f"{self.path.name} is no table over time")
         kept = [row for row in rows if len(row) == len(header) and float(row[0]) <= time]
         write_text(self.path, "".join(",".join(row) + "\n" for row in [header, *kept]))
         self._file, self._writer = self._open(header, "a")

@@ -151,3 +151,58 @@ def test_scenes_that_contradict_themselves():
 def test_numbers_without_physical_sense(make):
     with pytest.raises(OutOfRange):
         make()
+
+
+def test_cells_that_repeat_or_overlap():
+    cells = BODY.cells.copy()
+    cells[0, 1] = cells[0, 0]
+    with pytest.raises(BadMesh, match=r"cell\(s\) 0 name a node twice|belong to no cell"):
+        replace(BODY, cells=cells)
+    with pytest.raises(BadMesh, match="listed twice"):
+        replace(BODY, cells=np.vstack([BODY.cells, BODY.cells[:1]]), fibres=Fibres())
+
+
+@pytest.mark.parametrize("nodes", [np.ones(16, dtype=bool), [0.5, 1.0], ["a"], [1 + 0j]])
+def test_node_numbers_must_be_whole(nodes):
+    with pytest.raises(BadMesh, match="whole numbers"):
+        replace(BODY, node_sets={"held": nodes})
+
+
+def test_lists_are_taken():
+    body = replace(BODY, points=BODY.points.tolist(), node_sets={"held": [0, 1]})
+    assert body.nodes("held").dtype.kind == "i" and body.points.shape == BODY.points.shape
+
+
+def test_millimetres_are_noticed():
+    with pytest.raises(BadMesh, match="multiply by 1e-3"):
+        replace(BODY, points=1e3 * BODY.points)
+
+
+@pytest.mark.parametrize("control", [0.5, Ramp, None, lambda t: 0.5])
+def test_controls_that_are_none(control):
+    with pytest.raises(BadScene, match="is no control"):
+        ActiveMuscles({"genioglossus": control})
+    with pytest.raises(BadScene, match="must map"):
+        ActiveMuscles(["genioglossus"])
+
+
+@pytest.mark.parametrize("make", [lambda x: Viscosity(x), lambda x: Constant(x), Ramp])
+@pytest.mark.parametrize("value", ["0.5", None, True, np.array([0.1, 0.2])])
+def test_numbers_that_are_none(make, value):
+    with pytest.raises(OutOfRange):
+        make(value)
+
+
+def test_static_problems_without_stiffness_and_with_loose_pieces():
+    with pytest.raises(BadScene, match="tissue that resists"):
+        Statics(Scene(BODY, (Gravity(), Viscosity(1.0)), (Attached("x0"),)))
+    twin = np.vstack([BODY.points, BODY.points + np.array([0, 0.1, 0])])
+    cells = np.vstack([BODY.cells, BODY.cells + len(BODY.points)])
+    both = replace(BODY, points=twin, cells=cells, surfaces={})
+    with pytest.raises(BadScene, match="each of its pieces"):
+        Statics(Scene(both, (ReportTissue(),), (Attached("x0"),)))
+
+
+def test_muscle_without_cells():
+    with pytest.raises(BadMesh, match="no cells"):
+        MuscleFibres("m", np.array([], dtype=int), np.zeros((0, 3)), np.zeros(0))

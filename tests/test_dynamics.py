@@ -234,3 +234,107 @@ def test_bad_steps_are_refused(bad):
 def test_end_before_start_is_refused():
     with pytest.raises(OutOfRange, match="end"):
         next(Dynamics(muscle_scene(Ramp(0.1))).march(0.0))
+
+
+class Broken:
+    """A control of a user that fails at a time."""
+
+    breakpoints = jumps = ()
+
+    def __init__(self, error, time=0.011):
+        self.error, self.time = error, time
+
+    def __call__(self, time):
+        if time > self.time:
+            if isinstance(self.error, float):
+                return self.error
+            raise self.error
+        return 0.1
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("mine"), KeyboardInterrupt()])
+def test_what_a_user_raises_comes_through_and_what_was_computed_stays(tmp_path, error):
+    scene = muscle_scene(Broken(error))
+    with pytest.raises(type(error)):
+        simulate(scene, 0.1, tmp_path, TimeSteps(5e-3))
+    assert '"stopped' in (tmp_path / "summary.json").read_text()
+    rows = (tmp_path / "steps.csv").read_text().splitlines()
+    assert len(rows) == 4  # header, start, 5 ms, 10 ms
+    with np.load(tmp_path / "checkpoint.npz") as saved:
+        assert saved["time"] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("value", [2.0, -0.5, float("nan")])
+def test_an_activation_that_leaves_the_unit_interval_during_a_run_is_refused(value):
+    with pytest.raises(OutOfRange, match=r"activation of 'along' at t = 0\.01"):
+        list(Dynamics(muscle_scene(Broken(value)), TimeSteps(5e-3)).march(0.1))
+
+
+def test_refused_calls_leave_an_earlier_run_alone(tmp_path):
+    scene, steps = muscle_scene(Ramp(0.2)), TimeSteps(5e-3)
+    simulate(scene, 0.02, tmp_path, steps)
+    names = [p for p in tmp_path.rglob("*") if p.is_file() and p.name != ".lock"]
+    before = {p: p.read_bytes() for p in names}
+    other = Scene(block_body((0.05, 0.02, 0.02), (4, 2, 2)), (ReportTissue(),), (Attached("x0"),))
+    for bad in (
+        lambda: simulate(scene, np.nan, tmp_path, steps),
+        lambda: simulate(scene, 0.0, tmp_path, steps),
+        lambda: simulate(scene, 0.04, tmp_path, steps, frame_interval=0.0),
+        lambda: simulate(other, 0.04, tmp_path, steps, resume=True),
+        lambda: simulate(scene, 0.04, tmp_path, TimeSteps(4e-3), resume=True),
+        lambda: simulate(scene, 0.01, tmp_path, steps, resume=True),
+    ):
+        with pytest.raises((OutOfRange, BadScene)):
+            bad()
+    done = simulate(scene, 0.02, tmp_path, steps, resume=True)  # nothing left to do
+    assert done.summary["status"] == "finished"
+    assert {p: p.read_bytes() for p in before} == before
+
+
+@pytest.mark.parametrize("name", ["checkpoint.npz", "steps.csv", "trajectories.csv"])
+def test_damaged_files_are_named_when_a_run_is_resumed(tmp_path, name):
+    scene, steps = muscle_scene(Ramp(0.2)), TimeSteps(5e-3)
+    simulate(scene, 0.02, tmp_path, steps)
+    (tmp_path / name).write_bytes(b"\x00garbage")
+    with pytest.raises(BadScene, match="damaged"):
+        simulate(scene, 0.04, tmp_path, steps, resume=True)
+
+
+def test_two_runs_cannot_share_a_folder(tmp_path):
+    from dolfin_tongue.errors import TongueError
+    from dolfin_tongue.output import Recorder
+
+    scene = muscle_scene(Ramp(0.2))
+    first = Recorder(tmp_path, scene, 0.01)
+    with pytest.raises(TongueError, match="another run"):
+        Recorder(tmp_path, scene, 0.01)
+    first.close()
+    Recorder(tmp_path, scene, 0.01).close()
+
+
+def test_looking_at_a_body_does_not_change_its_fingerprint():
+    from dolfin_tongue.output import fingerprint
+
+    first, second = muscle_scene(Ramp(0.2)), muscle_scene(Ramp(0.2))
+    assert second.body.mass > 0 and second.body.scaled_jacobians.min() > 0
+    assert fingerprint(first) == fingerprint(second) != fingerprint(muscle_scene(Ramp(0.3)))
+
+
+def test_a_killed_compilation_does_not_block_the_next(tmp_path, monkeypatch):
+    from dolfin_tongue.compile import cache_folder
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = cache_folder()
+    folder.mkdir(parents=True)
+    orphan = folder / "libffcx_forms_0.c"
+    orphan.write_text("half")
+    from dolfin_tongue.system import System
+
+    System(Scene(BODY, (Gravity(),)), True)
+    assert not orphan.exists()
+
+
+def test_step_limits_must_make_sense():
+    for bad in ({"smallest": np.nan}, {"smallest": -1.0}, {"largest": 1e-4}, {"newton": None}):
+        with pytest.raises(OutOfRange):
+            TimeSteps(5e-3, **bad)
