@@ -15,6 +15,9 @@ CORNERS = np.array(
 FACES = np.array(
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])  # fmt: skip
 
+#: Stretch beyond which stiffening tissue may be too steep for a time step, or overflow.
+VERY_LONG = 1.6
+
 
 def shape_gradients(xi: FloatArray) -> FloatArray:
     """Gradients of the 8 trilinear shape functions in the master element.

@@ -7,10 +7,7 @@ import numpy as np
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import listing
-from dolfin_tongue.shape import largest_stretches, volume_ratios
-
-#: Stretch beyond which exponential tissue may be too steep for a step, or overflow.
-VERY_LONG = 1.6
+from dolfin_tongue.shape import VERY_LONG, largest_stretches, volume_ratios
 
 
 def where_and_why(body: Body, displacement: FloatArray) -> str:
@@ -24,7 +21,7 @@ def where_and_why(body: Body, displacement: FloatArray) -> str:
         cause = "cells are close to inversion: lower the activation or refine the mesh there"
     elif stretch[longest] > VERY_LONG:
         cause = (
-            f"cell {longest} is stretched {stretch[longest]:.2f} times, where exponential tissue "
+            f"cell {longest} is stretched {stretch[longest]:.2f} times, where stiffening tissue "
             "is steep and may overflow: lower the load or take a smaller dt"
         )
     else:
