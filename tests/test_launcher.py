@@ -189,7 +189,8 @@ def test_results_folder_is_made_where_the_caller_is(play, tmp_path):
 )
 def test_slow_tests_only_where_asked_for(play, arguments, expected):
     path = play(python3='for argument; do echo "$argument"; done')
-    assert direct("test", *arguments, path=path).stdout.splitlines() == ["-m", "pytest", *expected]
+    command = ["-m", "pytest", "-c", f"{TOP}/pyproject.toml", *expected]
+    assert direct("test", *arguments, path=path).stdout.splitlines() == command
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Xvfb")
