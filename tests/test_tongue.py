@@ -70,11 +70,9 @@ def test_inferior_longitudinal_moves_the_tip_down(moved):
 def test_transversalis_with_verticalis_lengthen_the_tongue(moved, body):
     """A muscular hydrostat: narrower and flatter means longer (report, fig. 26)."""
     u = moved("transversalis", "verticalis")
-    length = {
-        name: np.linalg.norm(body.points[body.landmark(name)] - body.points[body.landmark("root")])
-        for name in ("tip",)
-    }["tip"]
-    place = {k: body.points[body.landmark(k)] + MM * u[k] for k in ("tip", "root")}
+    ends = {name: body.points[body.landmark(name)] for name in ("tip", "root")}
+    length = np.linalg.norm(ends["tip"] - ends["root"])
+    place = {name: x + MM * u[name] for name, x in ends.items()}
     assert np.linalg.norm(place["tip"] - place["root"]) > 1.05 * length
     assert u["tip"][0] < -3
 

@@ -3,7 +3,7 @@
 The stage of the method stands at t_n + alpha_f dt. Momentum is stated there. The volume condition
 and the held nodes are stated at the end of the step, whose state follows from the stage by
 y_end = y_n + (y_stage - y_n) / alpha_f. So every accepted state keeps its volumes to the tolerance
-of Newton's method; stated at the stage, they would be lost at order dt^2 (2 % in a fast motion).
+of Newton's method; stated at the stage, they would be lost at order dt^2.
 The pressure is an unknown of the stage and has no memory.
 """
 
