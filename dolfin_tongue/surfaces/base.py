@@ -1,0 +1,58 @@
+"""What a rigid surface is: g(y) = 0, positive on its free side (49), (58)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from dolfin_tongue.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """Signed distance of points to a surface, with its first and second derivatives.
+
+    Parameters
+    ----------
+    distance : ndarray, shape (k,), m -- positive on the free side; inf where the surface does not
+        reach (beyond the rim of a sheet).
+    normal : ndarray, shape (k, 3) -- gradient of the distance; a unit vector, away from the wall.
+    curvature : ndarray, shape (k, 3, 3), 1/m -- second derivatives of the distance.
+    """
+
+    distance: FloatArray
+    normal: FloatArray
+    curvature: FloatArray
+
+
+class Surface(ABC):
+    """A fixed rigid surface, given by an implicit function g that grows towards its free side."""
+
+    @abstractmethod
+    def value(self, points: FloatArray) -> FloatArray:
+        """Return g at points of shape (k, 3), m; shape (k,), zero on the surface (49)."""
+
+    @abstractmethod
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """First derivatives of g, shape (k, 3); never zero near the surface."""
+
+    @abstractmethod
+    def hessian(self, points: FloatArray) -> FloatArray:
+        """Second derivatives of g (52), shape (k, 3, 3)."""
+
+    def gap(self, points: FloatArray) -> Gap:
+        """Signed distance (58) with its derivatives; here for a g that is that distance itself."""
+        return Gap(self.value(points), self.gradient(points), self.hessian(points))
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Points of the surface near given ones, shape (k, 3), m; Newton along the gradient."""
+        found = np.array(points, dtype=float)
+        for _ in range(50):
+            value, gradient = self.value(found), self.gradient(found)
+            move = (value / (gradient**2).sum(axis=1))[:, None] * gradient
+            found -= move
+            if not move.size or np.abs(move).max() < 1e-14:
+                break
+        return found
