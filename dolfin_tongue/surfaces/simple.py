@@ -47,7 +47,7 @@ class Plane(Surface):
         return (points - np.asarray(self.point)) @ unit(self, "normal", self.normal)
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """The unit normal, at every point."""
+        """Return the unit normal at every point."""
         return np.tile(unit(self, "normal", self.normal), (len(points), 1))
 
     def hessian(self, points: FloatArray) -> FloatArray:
@@ -82,7 +82,7 @@ class Round(Surface):
         return self._sign * (self._radial(points)[0] - self.radius)
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """Unit vectors away from the middle, or to it."""
+        """Return unit vectors away from the middle, or to it."""
         return self._sign * self._radial(points)[1]
 
     def hessian(self, points: FloatArray) -> FloatArray:
