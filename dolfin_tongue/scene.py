@@ -8,10 +8,14 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from dolfin_tongue.arrays import IntArray
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.errors import BadScene, listing
-from dolfin_tongue.term import EnergyTerm, Support, Term
+from dolfin_tongue.boundary.gravity import Gravity
+from dolfin_tongue.boundary.sliding import Sliding
+from dolfin_tongue.errors import BadScene, UnknownName, listing
+from dolfin_tongue.rigid.body import RigidBody
+from dolfin_tongue.rigid.forces import SKULL, Line
+from dolfin_tongue.term import EnergyTerm, Held, Support, Term
 
 #: Break points closer than this are one, s.
 SAME_TIME = 1e-9
@@ -25,12 +29,14 @@ class Scene:
     ----------
     body : mesh, regions, density, fibres.
     terms : the physics, each a frozen `Term`; only what is listed is computed.
-    supports : kinematic conditions on nodes, e.g. `Attached("base")`.
+    supports : kinematic conditions on nodes: `Attached("base")`, `Sliding(Plane(), "bottom")`, a
+        `RigidBody`.
 
     Raises
     ------
     UnknownName : a term or support names a muscle or region that the body does not have.
-    BadScene : something that is no term, no term at all, or two supports on one node.
+    BadScene : something that is no term, no term at all, two supports on one node, or a link to a
+        rigid body that is not there.
     """
 
     body: Body
@@ -53,31 +59,78 @@ class Scene:
         for support in self.supports:
             if not isinstance(support, Support):
                 raise BadScene(f"{support!r} is not a support; terms go into `terms`")
-        held = [support.nodes(self.body) for support in self.supports]
-        nodes, count = np.unique(np.concatenate([*held, []]).astype(np.int64), return_counts=True)
-        if (count > 1).any():
+            support.check(self.body)
+        self._check_shared()
+        self._check_links()
+
+    def _check_shared(self) -> None:
+        """Refuse nodes of two supports, by the names of both."""
+        owner: dict[int, Support] = {}
+        shared: dict[tuple[str, str], list[int]] = {}
+        for support in self.supports:
+            for node in map(int, support.nodes(self.body)):
+                if node in owner:
+                    shared.setdefault((owner[node].label, support.label), []).append(node)
+                owner[node] = support
+        for (first, second), nodes in shared.items():
             raise BadScene(
-                f"node(s) {nodes[count > 1].tolist()} belong to more than one support; give each "
-                "node to one of them"
+                f"node(s) {listing(nodes)} belong to both {first} and {second}; give each node to "
+                "one support"
             )
+
+    def _check_links(self) -> None:
+        """Refuse rigid bodies of one name, and lines to bodies that are not there."""
+        names = [body.name for body in self.rigid_bodies]
+        if len(set(names)) < len(names):
+            raise BadScene(f"rigid bodies need different names, not {', '.join(names)}")
+        for body in self.rigid_bodies:
+            for force in body.forces:
+                if isinstance(force, Line) and force.to not in (SKULL, *names):
+                    raise UnknownName("rigid body", force.to, (*names, SKULL))
+                if isinstance(force, Line) and force.to == body.name:
+                    raise BadScene(f"{body.name}: a {type(force).__name__} leads to itself")
+
+    @property
+    def rigid_bodies(self) -> tuple[RigidBody, ...]:
+        """Those of the supports, in their order."""
+        return tuple(part for part in self.supports if isinstance(part, RigidBody))
+
+    @property
+    def sliding(self) -> tuple[Sliding, ...]:
+        """Those of the supports, in their order."""
+        return tuple(part for part in self.supports if isinstance(part, Sliding))
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """Supports that prescribe displacements, in their order."""
+        return tuple(part for part in self.supports if isinstance(part, Held))
+
+    @property
+    def gravity(self) -> FloatArray:
+        """Acceleration by all `Gravity` terms, shape (3,), m/s2; rigid bodies feel it too."""
+        parts = [np.asarray(t.acceleration) for t in self.terms if isinstance(t, Gravity)]
+        return np.sum([np.zeros(3), *parts], axis=0)
 
     @property
     def held_nodes(self) -> IntArray:
-        """Sorted numbers of the nodes with prescribed displacement."""
-        held = [support.nodes(self.body) for support in self.supports]
+        """Sorted numbers of the nodes that move with a support or rigid body."""
+        held = [part.nodes(self.body) for part in (*self.held, *self.rigid_bodies)]
         return np.unique(np.concatenate([*held, []]).astype(np.int64))
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
-        """Times (s) at which some term is not smooth, increasing; round-off makes no two of one."""
-        times = sorted({t for term in self.terms for t in term.breakpoints})
+        """Times (s) at which some part is not smooth, increasing; round-off makes no two of one."""
+        every = [part.breakpoints for part in self.terms]
+        every += [part.breakpoints for part in self.supports]
+        times = sorted({t for part in every for t in part})
         pairs = zip(times, [*times[1:], np.inf], strict=False)
         return tuple(time for time, following in pairs if following - time > SAME_TIME)
 
     @property
     def jumps(self) -> tuple[float, ...]:
         """Those of the break points at which some term jumps."""
-        jumps = [t for term in self.terms for t in term.jumps]
+        every = [part.jumps for part in self.terms] + [part.jumps for part in self.supports]
+        jumps = [t for part in every for t in part]
         return tuple(t for t in self.breakpoints if any(abs(t - j) <= SAME_TIME for j in jumps))
 
     def check_volumes(self) -> None:
@@ -97,8 +150,15 @@ class Scene:
                 "a static problem needs tissue that resists: add a passive law, e.g. ReportTissue()"
             )
         pieces, number = self._pieces()
+        loose = [part.nodes(self.body) for part in (*self.sliding, *self._free_bodies)]
         for piece in range(number):
+            if any((pieces[nodes] == piece).any() for nodes in loose):
+                continue  # whether it is held, only the equations can tell
             self._check_held(self.held_nodes[pieces[self.held_nodes] == piece], number)
+
+    @property
+    def _free_bodies(self) -> tuple[RigidBody, ...]:
+        return tuple(body for body in self.rigid_bodies if not body.given.all())
 
     def _pieces(self) -> tuple[IntArray, int]:
         """Return the connected piece of each node, and how many pieces there are."""

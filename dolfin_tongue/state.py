@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
 
@@ -21,6 +23,10 @@ class State:
     iterations : Newton iterations of that step.
     unknowns : the solver's own vectors of y and y', where nodal values do not say everything (a
         quadratic displacement).
+    rigid, rigid_rate : ndarray, shape (b, 3) -- coordinates (m, m, rad) of the rigid bodies in the
+        order of the scene, and their rates.
+    sliding : ndarray, shape (s,) -- multipliers of the sliding nodes in the order of the scene:
+        forces on them along dg/dy, N where that is a unit vector.
     """
 
     time: float
@@ -30,3 +36,6 @@ class State:
     step: float = 0.0
     iterations: int = 0
     unknowns: tuple[FloatArray, FloatArray] | None = None
+    rigid: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    rigid_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    sliding: FloatArray = field(default_factory=lambda: np.zeros(0))

@@ -106,11 +106,33 @@ class SurfaceTerm(EnergyTerm):
 
 
 class Support(ABC):
-    """A kinematic condition on nodes."""
+    """A kinematic condition on nodes; no node may belong to two of them."""
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return type(self).__name__
+
+    def check(self, body: Body) -> None:
+        """Refuse names and numbers that do not fit the body, before any solve."""
 
     @abstractmethod
     def nodes(self, body: Body) -> IntArray:
-        """Node numbers whose displacement is prescribed."""
+        """Node numbers that it acts on."""
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times (s) at which it is not smooth; steps end there."""
+        return ()
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Those of the break points at which forces of it jump."""
+        return ()
+
+
+class Held(Support):
+    """Nodes whose displacement is prescribed."""
 
     @abstractmethod
     def displacement(self, points: FloatArray, time: float) -> FloatArray:

@@ -20,7 +20,7 @@ from dolfin_tongue.control import Control, Ramp, SmoothRamp
 from dolfin_tongue.geometry.simple import block_body, surface_nodes
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.scenes import REPORT_ATTACHMENTS, TISSUE_VISCOSITY
-from dolfin_tongue.term import Support
+from dolfin_tongue.term import Held
 
 #: The dynamic block of the comparison with FEBio: size, m, and first modulus, Pa.
 FEBIO_SIZE = (0.02, 0.01, 0.01)
@@ -28,7 +28,7 @@ FEBIO_C1 = 1037.0
 
 
 @dataclass(frozen=True)
-class Driven(Support):
+class Driven(Held):
     """The nodes of a region move along x in proportion to a time ramp.
 
     Parameters

@@ -9,11 +9,11 @@ import numpy as np
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import BadScene
-from dolfin_tongue.term import Support
+from dolfin_tongue.term import Held
 
 
 @dataclass(frozen=True)
-class Attached(Support):
+class Attached(Held):
     """The nodes of the named regions stand still.
 
     Parameters
@@ -27,6 +27,11 @@ class Attached(Support):
         if not regions or not all(isinstance(region, str) for region in regions):
             raise BadScene(f'Attached takes names, e.g. Attached("jaw", "hyoid"), not {regions}')
         object.__setattr__(self, "regions", regions)
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"Attached({', '.join(self.regions)})"
 
     def nodes(self, body: Body) -> IntArray:
         """Nodes of all regions, each once."""

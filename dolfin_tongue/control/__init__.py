@@ -1,5 +1,6 @@
 """Activation sources."""
 
+from dolfin_tongue.control.motion import Motion, Recorded, SmoothMove, Still, Swing
 from dolfin_tongue.control.sources import (
     Constant,
     Control,
@@ -10,4 +11,17 @@ from dolfin_tongue.control.sources import (
     require_activation,
 )
 
-__all__ = ["Constant", "Control", "Ramp", "SmoothRamp", "Step", "Table", "require_activation"]
+__all__ = [
+    "Constant",
+    "Control",
+    "Motion",
+    "Ramp",
+    "Recorded",
+    "SmoothMove",
+    "SmoothRamp",
+    "Step",
+    "Still",
+    "Swing",
+    "Table",
+    "require_activation",
+]

@@ -65,7 +65,7 @@ def problem_of(scene: Scene) -> Problem:
     """Problem of a scene: the same body, terms and supports."""
     scene.check_volumes()
     body, held = scene.body, scene.held_nodes
-    parts = [(part, part.nodes(body)) for part in scene.supports if type(part) not in STANDING]
+    parts = [(part, part.nodes(body)) for part in scene.held if type(part) not in STANDING]
 
     def support(time: float) -> FloatArray:
         value = np.zeros(body.points.shape)

@@ -20,7 +20,7 @@ from dolfin_tongue.control import Constant, SmoothRamp
 from dolfin_tongue.direct import KINDS, Mesh, Model, Problem
 from dolfin_tongue.fibres import Fibres, MuscleFibres
 from dolfin_tongue.geometry.simple import block_body, distort
-from dolfin_tongue.term import Support, Term
+from dolfin_tongue.term import Held, Term
 
 CENTIMETRE = 0.01
 MUSCLES = {"along": (1.0, 0.2, 0.0), "across": (0.0, 1.0, 1.0)}
@@ -40,7 +40,7 @@ TERMS: list[Term] = [
 ]
 
 
-class Shaken(Support):
+class Shaken(Held):
     """The face x0 moves along z as 1 mm sin(50 t)."""
 
     def nodes(self, body):

@@ -1,0 +1,158 @@
+"""Prescribed motions: one coordinate over time with its first two derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, pi, sin
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from dolfin_tongue.errors import BadScene, OutOfRange, is_number, require_positive
+
+
+@runtime_checkable
+class Motion(Protocol):
+    """A coordinate (m or rad) over time, with continuous velocity."""
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate and acceleration at a time (s)."""
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times (s) at which the acceleration is not smooth."""
+
+
+@dataclass(frozen=True)
+class Still:
+    """No motion.
+
+    Parameters
+    ----------
+    value : m or rad.
+    """
+
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_finite(self, value=self.value)
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate, acceleration."""
+        return self.value, 0.0, 0.0
+
+    breakpoints: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class SmoothMove:
+    """A move of minimum jerk (Flash and Hogan 1985): 10 s^3 - 15 s^4 + 6 s^5.
+
+    Parameters
+    ----------
+    distance : from 0, m or rad.
+    start : begin, s.
+    duration : s, > 0.
+    """
+
+    distance: float
+    start: float = 0.0
+    duration: float = 0.2
+
+    def __post_init__(self) -> None:
+        _require_finite(self, distance=self.distance, start=self.start)
+        require_positive(self, "s", duration=self.duration)
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate, acceleration."""
+        T = self.duration
+        s = min(1.0, max(0.0, (time - self.start) / T))
+        value = s**3 * (10 - 15 * s + 6 * s * s)
+        rate = 30 * s * s * (1 - s) ** 2 / T
+        acceleration = 60 * s * (1 - s) * (1 - 2 * s) / T**2
+        return self.distance * value, self.distance * rate, self.distance * acceleration
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Begin and end, s."""
+        return (self.start, self.start + self.duration)
+
+
+@dataclass(frozen=True)
+class Swing:
+    """Harmonic motion A (1 - cos(2 pi f t)) / 2, which starts from rest.
+
+    Parameters
+    ----------
+    amplitude : between the ends, m or rad.
+    frequency : Hz, > 0.
+    """
+
+    amplitude: float
+    frequency: float
+
+    def __post_init__(self) -> None:
+        _require_finite(self, amplitude=self.amplitude)
+        require_positive(self, "Hz", frequency=self.frequency)
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate, acceleration."""
+        omega, half = 2 * pi * self.frequency, self.amplitude / 2
+        phase = omega * time
+        return half * (1 - cos(phase)), half * omega * sin(phase), half * omega**2 * cos(phase)
+
+    breakpoints: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Recorded positions, interpolated by a cubic spline that rests at both ends.
+
+    Parameters
+    ----------
+    times : s, strictly increasing, at least two.
+    values : as many, m or rad; kept before and after.
+
+    Raises
+    ------
+    BadScene : different lengths, fewer than two, not finite, or times that do not increase.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("times", "values"):
+            object.__setattr__(self, name, tuple(float(x) for x in getattr(self, name)))
+        if len(self.times) != len(self.values) or len(self.times) < 2:
+            raise BadScene(
+                f"a recorded motion needs as many times as values and at least two, not "
+                f"{len(self.times)} times and {len(self.values)} values"
+            )
+        if not (np.isfinite(self.times).all() and np.isfinite(self.values).all()):
+            raise BadScene("times and values of a recorded motion must be finite")
+        if not (np.diff(self.times) > 0).all():
+            raise BadScene("the times of a recorded motion must increase")
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.times, self.values, bc_type="clamped")
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate, acceleration."""
+        if not self.times[0] <= time <= self.times[-1]:
+            return (self.values[0] if time < self.times[0] else self.values[-1]), 0.0, 0.0
+        return tuple(float(self._spline(time, order)) for order in range(3))  # type: ignore[return-value]
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """First and last time, s."""
+        return (self.times[0], self.times[-1])
+
+
+def _require_finite(owner: object, **numbers: float) -> None:
+    for name, value in numbers.items():
+        if not is_number(value):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number")

@@ -1,0 +1,25 @@
+"""Rigid bodies in the midsagittal plane: mandible and hyoid (61), (62)."""
+
+from dolfin_tongue.rigid.body import COORDINATES, SKULL, RigidBody
+from dolfin_tongue.rigid.forces import (
+    AngularSpring,
+    LineMuscle,
+    Moment,
+    PointForce,
+    RigidForce,
+    Spring,
+    StateForce,
+)
+
+__all__ = [
+    "COORDINATES",
+    "SKULL",
+    "AngularSpring",
+    "LineMuscle",
+    "Moment",
+    "PointForce",
+    "RigidBody",
+    "RigidForce",
+    "Spring",
+    "StateForce",
+]

@@ -1,0 +1,313 @@
+"""Forces on rigid bodies as functions of state and time: F and N of (61), (62).
+
+Each is stated at points of bodies: forces f, N, with their derivatives by the points' positions and
+velocities; `loads.Loads` turns them into forces and moments on the coordinates.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.constitutive.active import StressMobilisation
+from dolfin_tongue.control import Control
+from dolfin_tongue.control.sources import require_activation
+from dolfin_tongue.errors import (
+    BadScene,
+    OutOfRange,
+    is_number,
+    require_not_negative,
+    require_positive,
+)
+from dolfin_tongue.term import require_vector
+
+Vector = tuple[float, float, float]
+
+#: Name of what does not move, for the far end of a spring or muscle.
+SKULL = "skull"
+
+
+class RigidForce:
+    """A force on one rigid body, or between two."""
+
+    #: The body at the far end of a line; SKULL where there is none.
+    to: str = SKULL
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times (s) at which the force is not smooth."""
+        return ()
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Those of the break points at which it jumps."""
+        return ()
+
+
+@dataclass(frozen=True)
+class _Controlled(RigidForce):
+    """Base of forces whose size may follow a control."""
+
+    def _level(self, time: float) -> float:
+        return 1.0 if self.control is None else self.control(time)  # type: ignore[attr-defined]
+
+    def _check_control(self) -> None:
+        control = self.control  # type: ignore[attr-defined]
+        if control is not None and (isinstance(control, type) or not isinstance(control, Control)):
+            raise BadScene(
+                f"{type(self).__name__}.control must be a control, e.g. Ramp(1.0), not {control!r}"
+            )
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Those of the control, s."""
+        return () if self.control is None else self.control.breakpoints  # type: ignore[attr-defined]
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Those of the control, s."""
+        return () if self.control is None else self.control.jumps  # type: ignore[attr-defined]
+
+
+@dataclass(frozen=True)
+class PointForce(_Controlled):
+    """A given force on a point of the body; it keeps its direction in space.
+
+    Parameters
+    ----------
+    point : reference position of a point of the body, m.
+    force : N; the lateral component y does nothing.
+    control : factor over time; None: constant.
+    """
+
+    point: Vector
+    force: Vector
+    control: Control | None = None
+
+    def __post_init__(self) -> None:
+        require_vector(self, "point", self.point)
+        require_vector(self, "force", self.force)
+        self._check_control()
+
+    def at(self, time: float) -> FloatArray:
+        """Force at a time, N."""
+        return self._level(time) * np.asarray(self.force, dtype=float)
+
+
+class Turning(RigidForce):
+    """A moment that depends on the coordinates of its body alone."""
+
+    @abstractmethod
+    def generalised(
+        self, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Force on (x, z, angle), N and N m, with its derivatives by q and v, each (3, 3)."""
+
+
+@dataclass(frozen=True)
+class Moment(_Controlled, Turning):
+    """A given moment about y.
+
+    Parameters
+    ----------
+    moment : N m, positive lifts what lies in front.
+    control : factor over time; None: constant.
+    """
+
+    moment: float
+    control: Control | None = None
+
+    def __post_init__(self) -> None:
+        _require_finite(self, moment=self.moment)
+        self._check_control()
+
+    def generalised(
+        self, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the moment; it has no derivatives."""
+        return np.array([0, 0, self._level(time) * self.moment]), np.zeros((3, 3)), np.zeros((3, 3))
+
+
+@dataclass(frozen=True)
+class AngularSpring(Turning):
+    """Torsion spring and damper about the reference point: -k (angle - rest) - c angle'.
+
+    Parameters
+    ----------
+    stiffness : k, N m/rad, >= 0.
+    damping : c, N m s/rad, >= 0.
+    rest : rad.
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    rest: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_not_negative(self, "N m/rad", stiffness=self.stiffness)
+        require_not_negative(self, "N m s/rad", damping=self.damping)
+        _require_finite(self, rest=self.rest)
+
+    def generalised(
+        self, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Moment and its derivatives."""
+        by_q, by_v = np.zeros((3, 3)), np.zeros((3, 3))
+        by_q[2, 2], by_v[2, 2] = -self.stiffness, -self.damping
+        moment = -self.stiffness * (q[2] - self.rest) - self.damping * v[2]
+        return np.array([0.0, 0.0, moment]), by_q, by_v
+
+
+@dataclass(frozen=True)
+class StateForce(Turning):
+    """Any force on (x, z, angle) as a function of time and state.
+
+    Parameters
+    ----------
+    function : (t, q, v) -> three numbers (N, N, N m), with q = (x, z, angle) and its rate v. Its
+        derivatives are taken by central differences, so that it must be smooth.
+    """
+
+    function: Callable[[float, FloatArray, FloatArray], FloatArray]
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise BadScene(f"StateForce takes a function of (t, q, v), not {self.function!r}")
+        value = np.asarray(self.function(0.0, np.zeros(3), np.zeros(3)), dtype=float)
+        if value.shape != (3,) or not np.isfinite(value).all():
+            raise BadScene("StateForce.function must give three finite numbers (N, N, N m)")
+
+    def generalised(
+        self, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Force and its derivatives."""
+
+        def force(q: FloatArray, v: FloatArray) -> FloatArray:
+            return np.asarray(self.function(time, q, v), dtype=float)
+
+        step = 1e-6 * np.eye(3)
+        by_q = np.array([force(q + s, v) - force(q - s, v) for s in step]).T / 2e-6
+        by_v = np.array([force(q, v + s) - force(q, v - s) for s in step]).T / 2e-6
+        return force(q, v), by_q, by_v
+
+
+@dataclass(frozen=True)
+class Line(RigidForce):
+    """Base of what pulls along the straight line between two points.
+
+    Parameters
+    ----------
+    point : reference position of a point of the body, m.
+    anchor : reference position of the far end, m.
+    to : the body of the far end; default the skull.
+    """
+
+    point: Vector
+    anchor: Vector
+    to: str = field(default=SKULL, kw_only=True)
+
+    def __post_init__(self) -> None:
+        require_vector(self, "point", self.point)
+        require_vector(self, "anchor", self.anchor)
+        if self.length == 0:
+            raise OutOfRange(f"{type(self).__name__}.anchor", self.anchor, "apart from the point")
+
+    @property
+    def length(self) -> float:
+        """Length in the reference configuration, m."""
+        return float(np.linalg.norm(np.subtract(self.anchor, self.point)))
+
+    @abstractmethod
+    def tension(self, time: float, length: float, rate: float) -> tuple[float, float, float]:
+        """Tension, N, with its derivatives by length, N/m, and by its rate, N s/m."""
+
+
+@dataclass(frozen=True)
+class Spring(Line):
+    """A spring and damper in parallel.
+
+    Parameters
+    ----------
+    point, anchor, to : see `Line`.
+    stiffness : N/m, >= 0.
+    damping : N s/m, >= 0.
+    rest : length without force, m; default the length in the reference configuration.
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+    rest: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_not_negative(self, "N/m", stiffness=self.stiffness)
+        require_not_negative(self, "N s/m", damping=self.damping)
+        if self.rest is not None:
+            require_not_negative(self, "m", rest=self.rest)
+
+    def tension(self, time: float, length: float, rate: float) -> tuple[float, float, float]:
+        """Tension and its derivatives."""
+        rest = self.length if self.rest is None else self.rest
+        value = self.stiffness * (length - rest) + self.damping * rate
+        return value, self.stiffness, self.damping
+
+
+@dataclass(frozen=True)
+class LineMuscle(Line):
+    """A muscle as a line, with the dependence on stretch and rate of the tissue's muscles (73).
+
+    Parameters
+    ----------
+    point, anchor, to : see `Line`.
+    max_force : at full activation, N, > 0.
+    activation : control, in [0, 1].
+    law : dependence on stretch and stretch rate (74)-(78).
+    """
+
+    max_force: float = 1.0
+    activation: Control | None = None
+    law: StressMobilisation = field(default_factory=StressMobilisation)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_positive(self, "N", max_force=self.max_force)
+        if isinstance(self.activation, type) or not isinstance(self.activation, Control):
+            raise BadScene(
+                f"LineMuscle.activation must be a control, e.g. Ramp(0.5), not {self.activation!r}"
+            )
+
+    def tension(self, time: float, length: float, rate: float) -> tuple[float, float, float]:
+        """Tension and its derivatives, by central differences of the two factors."""
+        assert self.activation is not None
+        level = self.activation(time)
+        require_activation(level, f"activation at t = {time:g} s")
+        l0, law, step = self.length, self.law, 1e-6
+
+        def slope(function: Callable[[float], float], x: float) -> float:
+            return (function(x + step) - function(x - step)) / (2 * step)
+
+        stretch, speed = length / l0, rate / l0
+        f, g = law.length_factor(stretch), law.rate_factor(speed)
+        force = level * self.max_force
+        by_length = force * slope(law.length_factor, stretch) * g / l0
+        return force * f * g, by_length, force * f * slope(law.rate_factor, speed) / l0
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Those of the activation, s."""
+        return self.activation.breakpoints if self.activation else ()
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Those of the activation, s."""
+        return self.activation.jumps if self.activation else ()
+
+
+def _require_finite(owner: object, **numbers: float) -> None:
+    for name, value in numbers.items():
+        if not is_number(value):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number")

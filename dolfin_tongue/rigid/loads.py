@@ -1,0 +1,177 @@
+"""Inertia and forces of rigid bodies in their coordinates: M, I, F and N of (61), (62).
+
+With the centre of mass at the arm r from the reference point, its acceleration is
+x'' + angle'' r' - angle'^2 r (' of r by the angle), so that the inertia force on the coordinates is
+T^T m (T q'' + angle'^2 d2r) + I angle''.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.rigid import plane
+from dolfin_tongue.rigid.body import RigidBody
+from dolfin_tongue.rigid.forces import SKULL, Line, PointForce, RigidForce, Turning
+
+
+def as_vector(values: FloatArray) -> tuple[float, float, float]:
+    """Turn an array into a vector of floats."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+class Loads:
+    """Everything that acts on a set of rigid bodies but their tissue.
+
+    All arrays run over 3 b coordinates, body after body.
+
+    Parameters
+    ----------
+    bodies : the rigid bodies.
+    gravity : m/s2, shape (3,); the sum of the scene's.
+    """
+
+    def __init__(self, bodies: Sequence[RigidBody], gravity: FloatArray):
+        self.bodies, self.count = tuple(bodies), 3 * len(bodies)
+        self._places = {body.name: slice(3 * i, 3 * i + 3) for i, body in enumerate(bodies)}
+        self._centres = [body.arms(np.asarray(body.centre)) for body in bodies]
+        weights = [PointForce(body.centre, as_vector(body.mass * gravity)) for body in bodies]
+        self._forces: list[tuple[RigidBody, RigidForce]] = [
+            (body, force)
+            for body, weight in zip(bodies, weights, strict=True)
+            for force in (*body.forces, *([weight] if np.any(gravity) else []))
+        ]
+
+    # -- inertia -------------------------------------------------------------------------------
+
+    def mass(self, q: FloatArray) -> FloatArray:
+        """Mass matrix, shape (3b, 3b), kg, kg m and kg m2."""
+        matrix = np.zeros((self.count, self.count))
+        for body, arm, at in self._each():
+            T = plane.jacobian(arm, q[at])[0]
+            matrix[at, at] = body.mass * T.T @ T
+            matrix[at.start + 2, at.start + 2] += body.inertia
+        return matrix
+
+    def centrifugal(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Inertia force without accelerations, shape (3b,), N and N m."""
+        force = np.zeros(self.count)
+        for body, arm, at in self._each():
+            bent = plane.bend(arm, q[at])[0] * v[at][2] ** 2
+            force[at] = body.mass * plane.jacobian(arm, q[at])[0].T @ bent
+        return force
+
+    def inertia(self, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
+        """Inertia force on the coordinates, shape (3b,), N and N m."""
+        return self.mass(q) @ a + self.centrifugal(q, v)
+
+    def inertia_tangents(
+        self, q: FloatArray, v: FloatArray, a: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of `inertia` by q and v, shape (3b, 3b) each; that by a is `mass`."""
+        by_q, by_v = np.zeros((2, self.count, self.count))
+        for body, arm, at in self._each():
+            T, bent = plane.jacobian(arm, q[at])[0], plane.bend(arm, q[at])[0]
+            rate, angle = v[at][2], at.start + 2
+            acceleration = T @ a[at] + rate**2 * bent
+            # d(bent)/d(angle) = -T[:, angle], and only the angle's column of T turns
+            by_angle = T.T @ (bent * a[at][2] - rate**2 * T[:, 2])
+            by_angle[2] += bent @ acceleration
+            by_q[at, angle] = body.mass * by_angle
+            by_v[at, angle] = 2.0 * body.mass * rate * T.T @ bent
+        return by_q, by_v
+
+    def kinetic_energy(self, q: FloatArray, v: FloatArray) -> float:
+        """Kinetic energy, J."""
+        return 0.5 * float(v @ self.mass(q) @ v)
+
+    def momentum(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Linear momentum of all bodies, shape (3,), N s."""
+        total = np.zeros(3)
+        for body, arm, at in self._each():
+            total += body.mass * plane.jacobian(arm, q[at])[0] @ v[at]
+        return total
+
+    # -- forces --------------------------------------------------------------------------------
+
+    def force(self, time: float, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Return the forces on the coordinates, shape (3b,), N and N m."""
+        return self.force_and_tangents(time, q, v)[0]
+
+    def force_and_tangents(
+        self, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the forces on the coordinates and their derivatives by q and v, shape (3b, 3b) each."""
+        out = (np.zeros(self.count), *np.zeros((2, self.count, self.count)))
+        for body, force in self._forces:
+            if isinstance(force, Turning):
+                at = self._places[body.name]
+                value, by_q, by_v = force.generalised(time, q[at], v[at])
+                out[0][at] += value
+                out[1][at, at] += by_q
+                out[2][at, at] += by_v
+            elif isinstance(force, PointForce):
+                self._add_point(body, force, time, q, out)
+            elif isinstance(force, Line):
+                self._add_line(body, force, time, q, v, out)
+            else:
+                raise TypeError(f"no rule for {type(force).__name__}")
+        return out
+
+    def _add_point(
+        self,
+        body: RigidBody,
+        force: PointForce,
+        time: float,
+        q: FloatArray,
+        out: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> None:
+        at, arm, value = self._places[body.name], body.arms(np.asarray(force.point)), force.at(time)
+        out[0][at] += plane.jacobian(arm, q[at])[0].T @ value
+        out[1][at.start + 2, at.start + 2] += plane.bend(arm, q[at])[0] @ value
+
+    def _add_line(
+        self,
+        body: RigidBody,
+        line: Line,
+        time: float,
+        q: FloatArray,
+        v: FloatArray,
+        out: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> None:
+        """Tension T along n between both ends: force on the coordinates -T d(length)/dq."""
+        ends = [(body.name, line.point, -1.0), (line.to, line.anchor, 1.0)]
+        moving = [(name, point, sign) for name, point, sign in ends if name != SKULL]
+        apart, rate = np.subtract(line.anchor, line.point), np.zeros(3)
+        by_q = np.zeros((3, self.count))  # d(apart)/dq
+        bends: list[tuple[int, FloatArray]] = []
+        for name, point, sign in moving:
+            at, owner = self._places[name], self._body(name)
+            arm = owner.arms(np.asarray(point))
+            T = sign * plane.jacobian(arm, q[at])[0]
+            apart = apart + sign * plane.displacement(arm, q[at])[0]
+            rate = rate + T @ v[at]
+            by_q[:, at] = T
+            bends.append((at.start + 2, sign * plane.bend(arm, q[at])[0]))
+        length = float(np.linalg.norm(apart))
+        n = apart / length
+        tension, by_length, by_rate = line.tension(time, length, float(n @ rate))
+        slope = n @ by_q  # d(length)/dq, also d(length rate)/dv
+        across = (by_q - np.outer(n, slope)) / length  # dn/dq
+        second = by_q.T @ across
+        rate_slope = rate @ across
+        for angle, bent in bends:
+            second[angle, angle] += n @ bent
+            rate_slope[angle] += n @ bent * v[angle]
+        out[0][:] -= tension * slope
+        out[1][:] -= np.outer(slope, by_length * slope + by_rate * rate_slope) + tension * second
+        out[2][:] -= by_rate * np.outer(slope, slope)
+
+    def _body(self, name: str) -> RigidBody:
+        return next(body for body in self.bodies if body.name == name)
+
+    def _each(self) -> list[tuple[RigidBody, FloatArray, slice]]:
+        return list(zip(self.bodies, self._centres, self._places.values(), strict=True))
