@@ -71,7 +71,7 @@ class Loads:
     def inertia_tangents(
         self, q: FloatArray, v: FloatArray, a: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives of `inertia` by q and v, shape (3b, 3b) each; that by a is `mass`."""
+        """Return the derivatives of `inertia` by q and v, (3b, 3b) each; that by a is `mass`."""
         by_q, by_v = np.zeros((2, self.count, self.count))
         for body, arm, at in self._each():
             T, bent = plane.jacobian(arm, q[at])[0], plane.bend(arm, q[at])[0]
@@ -104,7 +104,7 @@ class Loads:
     def force_and_tangents(
         self, time: float, q: FloatArray, v: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the forces on the coordinates and their derivatives by q and v, shape (3b, 3b) each."""
+        """Return the forces on the coordinates and their derivatives by q and v, (3b, 3b) each."""
         out = (np.zeros(self.count), *np.zeros((2, self.count, self.count)))
         for body, force in self._forces:
             if isinstance(force, Turning):
