@@ -108,6 +108,16 @@ class MixedSpace:
         return self._displacement[1]
 
     @cached_property
+    def displacement_element(self) -> basix.finite_element.FiniteElement:
+        """Scalar element of each component of the displacement."""
+        return self._displacement[0].element.basix_element
+
+    def cell_displacement_dofs(self, cells: IntArray) -> IntArray:
+        """Displacement dofs of DOLFINx cells, shape (f, k, 3), in the order of the element."""
+        part, to_mixed = self._displacement
+        return to_mixed[part.dofmap.list[cells]]
+
+    @cached_property
     def _vertices(self) -> IntArray:
         """Node of the body at each local vertex of each DOLFINx cell."""
         node_of = np.asarray(self.mesh.geometry.input_global_indices)

@@ -14,11 +14,12 @@ from dolfinx import fem
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
+from dolfin_tongue.boundary.attached import Attached
 from dolfin_tongue.compile import compile_form
+from dolfin_tongue.coupling import Arguments
 from dolfin_tongue.shape import gauss_jacobians
 from dolfin_tongue.state import State
-from dolfin_tongue.system import System
-from dolfin_tongue.term import Term
+from dolfin_tongue.system import System, labels_of
 
 
 def volume_changes(body: Body, displacement: FloatArray) -> FloatArray:
@@ -74,25 +75,34 @@ class EnergyAudit:
         velocity = kin.velocity
         density = system.number(system.scene.body.density)
         parts = {"kinetic": density / 2 * ufl.inner(velocity, velocity) * system.dx}
-        names = _labels(terms)
+        names = labels_of(terms)
         for term, name in zip(terms, names, strict=True):
             energy = term.energy(kin, system.fields)
             if energy is not None:
                 parts[name] = energy
-        self.energy_names = tuple(parts)
+        self._form_energies, self._couplings = len(parts), system.couplings
         self._energies = self._cell_integrals(list(parts.values()))
         powers = {
             name: term.virtual_power(kin, system.fields, velocity)
             for term, name in zip(terms, names, strict=True)
             if name not in parts
         }
-        self.work_names = tuple(powers)
+        self._form_powers = len(powers)
         self._powers = self._cell_integrals(list(powers.values()))
+        at = self._set(system.state_of(0.0, *np.zeros((2, system.size))), 0.0)
+        coupled = [(c.energies(at), c.powers(at)) for c in self._couplings]
+        self.energy_names = (*parts, *(name for energies, _ in coupled for name in energies))
+        self.work_names = (*powers, *(name for _, works in coupled for name in works))
         self.works = dict.fromkeys(self.work_names, 0.0)
         self.exchanged = 0.0
         self._start: float | None = None
         self._before: State | None = None
-        self._power_before = np.zeros(len(powers))
+        self._power_before = np.zeros(len(self.work_names))
+        self._moves = any(body.given.any() for body in system.scene.rigid_bodies) or any(
+            not isinstance(part, Attached) for part in system.scene.held
+        )
+        if self._moves:
+            self.works["supports"] = 0.0
 
     def _cell_integrals(self, forms: Sequence[ufl.Form]) -> fem.Form | None:
         """All integrals at once, each into its own component of a cell-wise test function."""
@@ -116,14 +126,42 @@ class EnergyAudit:
         fem.assemble_vector(vector, form)
         return vector.reshape(cells, -1).sum(axis=0)[:count]
 
-    def _set(self, state: State, time: float) -> None:
+    def _set(self, state: State, time: float) -> Arguments:
+        """Hand a state to the system, for its couplings too."""
         y, rate = self._system.vectors(state)
         self._system.set_state(time, y, rate, np.zeros_like(rate), y)
+        return self._system.arguments(time)
 
     def powers(self, state: State, time: float) -> FloatArray:
         """Power that each rate term adds to the body (W), in the order of `work_names`."""
-        self._set(state, time)
-        return -self._evaluate(self._powers, len(self.work_names))
+        at = self._set(state, time)
+        power = -self._evaluate(self._powers, self._form_powers)
+        return np.append(power, [p for c in self._couplings for p in c.powers(at).values()])
+
+    def energies(self, state: State) -> FloatArray:
+        """Energies, J, in the order of `energy_names`."""
+        at = self._set(state, state.time)
+        energy = self._evaluate(self._energies, self._form_energies)
+        return np.append(energy, [e for c in self._couplings for e in c.energies(at).values()])
+
+    def observed(self, state: State) -> dict[str, float]:
+        """Return what the couplings show of a state: contact area, resultant."""
+        if not self._couplings:
+            return {}
+        at = self._set(state, state.time)
+        return {name: x for c in self._couplings for name, x in c.observed(at).items()}
+
+    def _support_work(self, first: State, second: State, middle: State) -> float:
+        """Work of supports that move, J: their forces in the middle of a step times the way.
+
+        The acceleration there is the change of velocity, so that two states say everything.
+        """
+        system = self._system
+        (y0, v0), (y1, v1) = system.vectors(first), system.vectors(second)
+        y, _ = system.vectors(middle)
+        dt = second.time - first.time
+        system.set_state(middle.time, y, (y1 - y0) / dt, (v1 - v0) / dt, y)
+        return system.support_work(middle.time, y1 - y0)
 
     def update(self, state: State) -> dict[str, float]:
         """Account for a newly accepted state.
@@ -141,10 +179,13 @@ class EnergyAudit:
             self.exchanged += float(np.abs(work).sum())
             for name, value in zip(self.work_names, work, strict=True):
                 self.works[name] += float(value)
+            if self._moves:
+                moved = self._support_work(self._before, state, middle)
+                self.works["supports"] += moved
+                self.exchanged += abs(moved)
         self._power_before = self.powers(state, state.time) if jump else power
         self._before = state
-        self._set(state, state.time)
-        energies = self._evaluate(self._energies, len(self.energy_names))
+        energies = self.energies(state)
         total = float(energies.sum())
         if self._start is None:
             self._start = total
@@ -152,7 +193,8 @@ class EnergyAudit:
         named = zip(self.energy_names, energies, strict=True)
         record = {f"{name}_J": float(value) for name, value in named}
         record |= {f"work_{name}_J": value for name, value in self.works.items()}
-        return record | {"balance_J": balance, "exchanged_J": self.exchanged}
+        record |= {"balance_J": balance, "exchanged_J": self.exchanged}
+        return record | self.observed(state)
 
     def memory(self) -> dict[str, Any]:
         """Return what has to be kept to continue the account in a resumed run."""
@@ -165,7 +207,7 @@ class EnergyAudit:
     def restore(self, memory: dict[str, Any], state: State) -> None:
         """Continue the account of an earlier run at its last state."""
         self._start, self.exchanged = memory["start"], memory["exchanged"]
-        self.works = dict(zip(self.work_names, memory["works"], strict=True))
+        self.works = dict(zip(self.works, memory["works"], strict=True))
         self._before = state
         self._power_before = self.powers(state, state.time)
 
@@ -184,16 +226,9 @@ def hermite_middle(first: State, second: State) -> State:
     if first.unknowns and second.unknowns:
         (y0, v0), (y1, v1) = first.unknowns, second.unknowns
         unknowns = middle(y0, y1, v0, v1)
+    rigid = middle(first.rigid, second.rigid, first.rigid_rate, second.rigid_rate)
     pressure = (first.pressure + second.pressure) / 2
-    return State(first.time + dt / 2, displacement, velocity, pressure, dt / 2, 0, unknowns)
-
-
-def _labels(terms: Sequence[Term]) -> list[str]:
-    """Class names of the terms in small letters, numbered where one occurs twice."""
-    names = [type(term).__name__ for term in terms]
-    labels = []
-    for i, name in enumerate(names):
-        suffix = f"_{names[: i + 1].count(name)}" if names.count(name) > 1 else ""
-        words = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
-        labels.append(words + suffix)
-    return labels
+    return State(
+        first.time + dt / 2, displacement, velocity, pressure, dt / 2, 0, unknowns,
+        rigid[0], rigid[1], (first.sliding + second.sliding) / 2,
+    )  # fmt: skip

@@ -1,4 +1,7 @@
-"""Semi-discrete equations of a scene: G(t, y, y', y'') = 0 with y = (u, p). There is no dt here.
+"""Semi-discrete equations of a scene: G(t, y, y', y'') = 0. There is no dt here.
+
+y = (u, p, unknowns of the couplings): displacement, pressure and, where a scene has them,
+multipliers of sliding nodes and coordinates of rigid bodies.
 
 The residual is a pure function of its arguments. The rows of the volume condition and of the held
 nodes are kinematic: they are stated for the state at the *end* of a time step, so that every
@@ -7,23 +10,34 @@ accepted state keeps its volumes, while the rows of momentum are stated at the s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 import ufl
 from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from petsc4py import PETSc
 
 from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.compile import compile_form
 from dolfin_tongue.constitutive.incompressible import pressure_power, volume_condition
+from dolfin_tongue.coupling import (
+    Arguments,
+    ContactSurface,
+    Coupling,
+    RigidBodies,
+    Shifts,
+    SlidingNodes,
+)
 from dolfin_tongue.errors import BadScene, listing
 from dolfin_tongue.kinematics import Kinematics
 from dolfin_tongue.mesh import cell_function, mixed_space, set_cell_values
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.state import State
+from dolfin_tongue.term import Term
 
 
 class CellFields:
@@ -94,6 +108,7 @@ class System:
         self.space = mixed_space(scene.body, pair)
         self.fields = CellFields(self.space)
         self._build_states()
+        self._build_couplings()
         self.terms_in_form: list = []
         residual = self._residual_form()
         self.residual_form = residual
@@ -102,17 +117,43 @@ class System:
         self._jacobian = compile_form(self.jacobian_form)
         self._pressure_dofs = self.space.pressure_dofs
         self._pressure_weights = self._weights_of_pressure()
-        held = [support.nodes(scene.body) for support in scene.supports]
+        held = [support.nodes(scene.body) for support in scene.held]
         groups = self.space.held(np.concatenate([*held, []]).astype(np.int64))
         self._held_corners = [corners for _, corners in groups]
         self._held_dofs = np.concatenate([dofs for dofs, _ in groups]).astype(np.int32)
         self._held_points = [scene.body.points[part] for part in held]
-        stuck = self.space.cells_of_stuck_pressures(self._held_dofs)
+        moved = [part.dofs for part in self.couplings if isinstance(part, RigidBodies)]
+        every = np.concatenate([self._held_dofs, *moved])
+        stuck = self.space.cells_of_stuck_pressures(every)
         if stuck.size:
             raise BadScene(
                 f"nothing determines the pressure at a corner of cell(s) {listing(stuck)}: all "
                 f"displacement around it is held; refine the mesh or take another pair than {pair}"
             )
+
+    # -- couplings -----------------------------------------------------------------------------
+
+    def _build_couplings(self) -> None:
+        """Parts outside the forms, and the numbers of their unknowns."""
+        scene, space = self.scene, self.space
+        contacts = [term for term in scene.terms if isinstance(term, Contact)]
+        named = zip(contacts, labels_of(contacts), strict=True)
+        self.couplings: list[Coupling] = [ContactSurface(x, space, name) for x, name in named]
+        size = space.size
+        for support in scene.sliding:
+            self.couplings.append(SlidingNodes(support, space, size))
+            size += len(self.couplings[-1].multipliers)
+        self.size = size
+        if scene.rigid_bodies:
+            self.couplings.append(RigidBodies(scene, space, size))
+            self.size += len(self.couplings[-1].positions)
+        empty = np.zeros(0, dtype=np.int64)
+        #: Unknowns of sliding nodes and of rigid bodies.
+        self.sliding_dofs = np.concatenate([empty, *(c.multipliers for c in self.couplings)])
+        self.rigid_dofs = np.concatenate([empty, *(c.positions for c in self.couplings)])
+        #: Unknowns that are positions, with inertia; and those of a stage alone, without memory.
+        self.position_dofs = np.concatenate([space.all_displacement_dofs.ravel(), self.rigid_dofs])
+        self.multiplier_dofs = np.concatenate([space.pressure_dofs, self.sliding_dofs])
 
     # -- forms ---------------------------------------------------------------------------------
 
@@ -178,41 +219,110 @@ class System:
     ) -> None:
         """Set the arguments (t, y, y', y'', y at the end of the step); mixed arrays."""
         self.fields.set_time(time)
-        self.state.x.array[:] = state
+        inside = slice(self.space.size)
+        self.state.x.array[:] = state[inside]
         if self.dynamic:
-            self.rate.x.array[:] = rate
-            self.acceleration.x.array[:] = acceleration
-            self.end_state.x.array[:] = end_state
+            assert rate is not None and acceleration is not None and end_state is not None
+            self.rate.x.array[:] = rate[inside]
+            self.acceleration.x.array[:] = acceleration[inside]
+            self.end_state.x.array[:] = end_state[inside]
+        if rate is None or acceleration is None or end_state is None:
+            rate, acceleration, end_state = np.zeros_like(state), np.zeros_like(state), state
+        self._arrays = (time, (state, rate, acceleration, end_state))
+
+    def arguments(self, time_end: float) -> Arguments:
+        """Arguments that were set, for the couplings."""
+        time, parts = self._arrays
+        load = 1.0 if self.load is None else float(self.load.value)
+        return Arguments(time, time_end, *parts, load)
 
     def residual(self, time_end: float, out: FloatArray) -> None:
         """Residual at the arguments that were set; N in rows of u, m3 in rows of p."""
         out[:] = 0.0
-        fem.assemble_vector(out, self._residual)
+        fem.assemble_vector(out[: self.space.size], self._residual)
+        if self.couplings:
+            at = self.arguments(time_end)
+            for coupling in self.couplings:
+                coupling.add_residual(at, out)
         if self._held_dofs.size:
             out[self._held_dofs] = self.end_state.x.array[self._held_dofs] - self.held_displacement(
                 time_end
             )
 
-    def jacobian(self, matrix: PETSc.Mat, shifts: tuple[float, float, float] = (0, 0, 0)) -> None:
+    def reactions(self, time_end: float) -> FloatArray:
+        """Residual with the rows of momentum of held nodes too: what supports exert on them, N."""
+        out, at = np.zeros(self.size), self.arguments(time_end)
+        fem.assemble_vector(out[: self.space.size], self._residual)
+        for coupling in self.couplings:
+            if not isinstance(coupling, RigidBodies):
+                coupling.add_residual(at, out)
+        return out
+
+    def support_work(self, time: float, way: FloatArray) -> float:
+        """Work of moving supports on a small way of the mixed unknowns, J."""
+        at, rows = self.arguments(time), self.reactions(time)
+        held = float(np.sum(rows[self._held_dofs] * way[self._held_dofs]))
+        bodies = [part for part in self.couplings if isinstance(part, RigidBodies)]
+        return held + sum(part.work(at, rows, way) for part in bodies)
+
+    def jacobian(
+        self,
+        matrix: PETSc.Mat,
+        shifts: tuple[float, float, float] = (0, 0, 0),
+        time_end: float = 0.0,
+    ) -> None:
         """Jacobian at the arguments that were set: dG/dy + shifts . dG/d(y', y'', y_end)."""
         for constant, shift in zip(self._shifts, shifts, strict=False):
             constant.value = shift
-        matrix.zeroEntries()
-        assemble_matrix(matrix, self._jacobian)
-        matrix.assemble()
+        form_matrix = self._form_matrix if self.couplings else matrix
+        form_matrix.zeroEntries()
+        assemble_matrix(form_matrix, self._jacobian)
+        form_matrix.assemble()
+        end = shifts[2] if self.dynamic else 1.0
+        if self.couplings:
+            self._couple(matrix, Shifts(shifts[0], shifts[1], end), time_end)
         if self._held_dofs.size:
-            diagonal = shifts[2] if self.dynamic else 1.0
-            matrix.zeroRowsLocal(self._held_dofs.ravel(), diag=diagonal)
+            matrix.zeroRows(self._held_dofs.ravel(), diag=end)
+
+    def _couple(self, matrix: PETSc.Mat, shifts: Shifts, time_end: float) -> None:
+        """Add the couplings to the matrix of the forms."""
+        at, rows = self.arguments(time_end), np.zeros(self.size)
+        fem.assemble_vector(rows[: self.space.size], self._residual)
+        total = self._embedded(self._form_matrix)
+        for coupling in self.couplings:
+            total = coupling.with_tangent(total, at, shifts, rows)
+            coupling.add_residual(at, rows)
+        total = total.tocsr()
+        matrix.zeroEntries()
+        matrix.setValuesCSR(*_places(total), total.data)
+        matrix.assemble()
+
+    def _embedded(self, matrix: PETSc.Mat) -> sp.csr_array:
+        """Matrix of the forms with empty rows and columns of the couplings."""
+        indptr, indices, values = matrix.getValuesCSR()
+        indptr = np.pad(indptr, (0, self.size - self.space.size), mode="edge")
+        return sp.csr_array((values, indices, indptr), shape=(self.size, self.size))
 
     def new_matrix(self) -> PETSc.Mat:
         """Empty matrix with the sparsity of the Jacobian."""
         matrix = create_matrix(self._jacobian)
+        if self.couplings:
+            assemble_matrix(matrix, self._jacobian)  # PETSc drops places that were never filled
+            matrix.assemble()
+            self._form_matrix, entries = matrix, self._embedded(matrix)
+            entries.data[:] = 1.0
+            for coupling in self.couplings:
+                entries = coupling.pattern(entries)
+            pattern = (entries + sp.eye_array(self.size)).tocsr()
+            pattern.sort_indices()
+            csr = (*_places(pattern), np.zeros(pattern.nnz))
+            matrix = PETSc.Mat().createAIJ(self.size, csr=csr, comm=PETSc.COMM_SELF)
         matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         return matrix
 
     def held_displacement(self, time: float) -> FloatArray:
         """Prescribed displacement of the held dofs, shape (number of points, 3), m."""
-        supports = zip(self.scene.supports, self._held_points, strict=True)
+        supports = zip(self.scene.held, self._held_points, strict=True)
         nodes = np.concatenate([support.displacement(x, time) for support, x in supports])
         if self.space.nodal_only:
             return nodes
@@ -250,14 +360,21 @@ class System:
         """State in the body's order from the mixed arrays of y and y'."""
         unknowns = None if self.space.nodal_only else (y.copy(), rate.copy())
         fields = (self.displacement(y), self.displacement(rate), self.pressure(y))
-        return State(time, *fields, step, iterations, unknowns)
+        rigid = (y[self.rigid_dofs].reshape(-1, 3), rate[self.rigid_dofs].reshape(-1, 3))
+        return State(time, *fields, step, iterations, unknowns, *rigid, y[self.sliding_dofs])
 
     def vectors(self, state: State) -> tuple[FloatArray, FloatArray]:
         """Mixed arrays of y and y' of a state; new ones."""
         if state.unknowns is not None:
             y, rate = state.unknowns
             return y.copy(), rate.copy()
-        return self.mixed(state.displacement, state.pressure), self.mixed(state.velocity)
+        y, rate = self.mixed(state.displacement, state.pressure), self.mixed(state.velocity)
+        if self.rigid_dofs.size and state.rigid.size:
+            y[self.rigid_dofs] = state.rigid.ravel()
+            rate[self.rigid_dofs] = state.rigid_rate.ravel()
+        if self.sliding_dofs.size and state.sliding.size:
+            y[self.sliding_dofs] = state.sliding
+        return y, rate
 
     def mixed(self, displacement: FloatArray, pressure: FloatArray | float = 0.0) -> FloatArray:
         """Mixed array from displacement, shape (n, 3), and pressure, shape (m,)."""
@@ -266,7 +383,7 @@ class System:
             raise BadScene(
                 f"a displacement of shape {body.points.shape} is needed, not {displacement.shape}"
             )
-        array = np.zeros(self.space.size)
+        array = np.zeros(self.size)
         if not self.space.nodal_only:
             if np.any(displacement):
                 raise BadScene("nodal values do not determine a quadratic displacement")
@@ -274,3 +391,19 @@ class System:
         array[self.space.displacement_dofs] = displacement
         array[self.space.pressure_dofs] = pressure
         return array
+
+
+def _places(matrix: sp.csr_array) -> tuple[IntArray, IntArray]:
+    """Row starts and columns in the integers of PETSc."""
+    return matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType)
+
+
+def labels_of(terms: Sequence[Term]) -> list[str]:
+    """Class names of the terms in small letters, numbered where one occurs twice."""
+    names = [type(term).__name__ for term in terms]
+    labels = []
+    for i, name in enumerate(names):
+        suffix = f"_{names[: i + 1].count(name)}" if names.count(name) > 1 else ""
+        words = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
+        labels.append(words + suffix)
+    return labels

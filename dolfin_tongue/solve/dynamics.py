@@ -44,12 +44,14 @@ METHODS: dict[str, dict[str, float]] = {
 }
 
 
-#: Reason of a step whose end has an inverted cell, beside those of PETSc.
-INVERTED = -1000
+#: Reasons to refuse a step that Newton's method solved, beside those of PETSc: its end has an
+#: inverted cell, or has passed an obstacle.
+INVERTED, PENETRATED = -1000, -1001
 
 
 def _name(reason: int) -> str:
-    return "INVERTED_CELL" if reason == INVERTED else reason_name(reason)
+    names = {INVERTED: "INVERTED_CELL", PENETRATED: "PENETRATION"}
+    return names.get(reason) or reason_name(reason)
 
 
 @dataclass(frozen=True)
@@ -121,8 +123,8 @@ class Dynamics:
         self.system = System(scene, dynamic=True, pair=pair)
         self.steps = steps or TimeSteps()
         self._velocity_before: FloatArray | None = None
-        self._stage_pressure_before: FloatArray | None = None
-        self._stage_pressure = np.zeros(len(self.system.space.pressure_dofs))
+        self._multipliers_before: FloatArray | None = None
+        self._multipliers = np.zeros(len(self.system.multiplier_dofs))
         self._connect()
 
     def _connect(self) -> None:
@@ -132,7 +134,7 @@ class Dynamics:
         self.newton = Newton(self.system, self.ts.getSNES(), self.steps.newton, counts)
         self.ts.setI2Jacobian(self.newton.careful(self._jacobian), self.newton.matrix)
         function = self.newton.careful(self._function)
-        self.ts.setI2Function(function, PETSc.Vec().createSeq(self.system.space.size))
+        self.ts.setI2Function(function, PETSc.Vec().createSeq(self.system.size))
         self.ts.getSNES().setInitialGuess(self.newton.careful(self._predict))
 
     def _new_ts(self) -> PETSc.TS:
@@ -172,12 +174,12 @@ class Dynamics:
         time_end, _ = self._set_state(ts, time, state, rate, acceleration)
         self.newton.residuals += 1
         self.system.residual(time_end, out.array_w)
-        self._stage_pressure = state.array_r[self.system.space.pressure_dofs]
+        self._multipliers = state.array_r[self.system.multiplier_dofs]
 
     def _jacobian(self, ts, time, state, rate, acceleration, shift_v, shift_a, matrix, _) -> None:
         def assemble() -> None:
-            _, fraction = self._set_state(ts, time, state, rate, acceleration)
-            self.system.jacobian(matrix, (shift_v, shift_a, 1.0 / fraction))
+            time_end, fraction = self._set_state(ts, time, state, rate, acceleration)
+            self.system.jacobian(matrix, (shift_v, shift_a, 1.0 / fraction), time_end)
 
         self.newton.jacobian(matrix, (shift_v, shift_a), assemble)
 
@@ -187,7 +189,7 @@ class Dynamics:
         velocity = rate.array_r
         if self._velocity_before is not None:
             velocity = 1.5 * velocity - 0.5 * self._velocity_before
-        dofs = self.system.space.all_displacement_dofs
+        dofs = self.system.position_dofs
         guess.array_w[dofs] += self.ts.getTimeStep() * velocity[dofs]
 
     # -- marching ------------------------------------------------------------------------------
@@ -225,7 +227,7 @@ class Dynamics:
 
     def rest(self, time: float = 0.0) -> State:
         """Return the reference configuration at rest."""
-        zero = np.zeros(self.system.space.size)
+        zero = np.zeros(self.system.size)
         return self.system.state_of(time, zero, zero)
 
     def _set_solution(self, state: State) -> None:
@@ -241,7 +243,7 @@ class Dynamics:
     def _restart(self) -> None:
         """Forget accelerations and predictions: the motion has a new beginning."""
         self.ts.restartStep()
-        self._velocity_before = self._stage_pressure_before = None
+        self._velocity_before = self._multipliers_before = None
         self.newton.renew()
 
     def _march_segment(self, state: State, end: float) -> Iterator[State]:
@@ -300,13 +302,16 @@ class Dynamics:
             self.newton.reraise(error)
             return Reason.DIVERGED_LINEAR_SOLVE
         reason = self.ts.getSNES().getConvergedReason()
-        return INVERTED if reason > 0 and self._inverted() else reason
+        return self._judged(reason) if reason > 0 else reason
 
-    def _inverted(self) -> bool:
-        """Whether a cell is inverted at the end of the step, beyond the stage that was solved."""
-        solution, _ = self.ts.getSolution2()
-        body, displacement = self.system.scene.body, self.system.displacement(solution.array_r)
-        return not (gauss_jacobians(body.points + displacement, body.cells) > 0).all()
+    def _judged(self, reason: int) -> int:
+        """Refuse a step whose end, beyond the stage that was solved, is impossible."""
+        y = self.ts.getSolution2()[0].array_r
+        body, displacement = self.system.scene.body, self.system.displacement(y)
+        if not (gauss_jacobians(body.points + displacement, body.cells) > 0).all():
+            return INVERTED
+        refused = any(part.refusal(self.ts.getTime(), y) for part in self.system.couplings)
+        return PENETRATED if refused else reason
 
     def _cut(self, dt: float, error: float | None) -> float:
         """Smaller step after a failure (a quarter) or after too large an error."""
@@ -353,11 +358,12 @@ class Dynamics:
         self.newton.renew()
 
     def _accepted(self, time: float, dt: float, iterations: int) -> State:
-        """State at the end of a step, with the pressure extrapolated from the stages."""
+        """State at the end of a step, with the multipliers extrapolated from the stages."""
         solution, rate = self.ts.getSolution2()
-        pressure: FloatArray = self._stage_pressure
-        if self._stage_pressure_before is not None:
-            pressure = pressure + (1 - self.steps.stage) * (pressure - self._stage_pressure_before)
-        self._stage_pressure_before = self._stage_pressure
-        solution.array_w[self.system.space.pressure_dofs] = pressure
+        multipliers: FloatArray = self._multipliers
+        if self._multipliers_before is not None:
+            change = multipliers - self._multipliers_before
+            multipliers = multipliers + (1 - self.steps.stage) * change
+        self._multipliers_before = self._multipliers
+        solution.array_w[self.system.multiplier_dofs] = multipliers
         return self.system.state_of(time, solution.array_r, rate.array_r, dt, iterations)

@@ -106,7 +106,7 @@ class Newton:
         self._step_sizes: list[float] = []
         self.residuals, self.iterations, self.factorisations = counts or (0, 0, 0)
         self._raised: BaseException | None = None
-        self._displacement_dofs = system.space.all_displacement_dofs.ravel()
+        self._positions = system.position_dofs
         snes.setConvergenceTest(self.careful(self._converged))
 
     @property
@@ -164,10 +164,13 @@ class Newton:
             self._step_sizes = []
             return None
         self.iterations += 1
-        update = snes.getSolutionUpdate().array_r[self._displacement_dofs]
+        update = snes.getSolutionUpdate().array_r[self._positions]
         size = float(np.abs(update).max())
-        volume = self.volume_error(snes.getFunction()[0].array_r)
-        if size <= self.tolerances.displacement and volume <= self.tolerances.volume:
+        residual = snes.getFunction()[0].array_r
+        settled = self.volume_error(residual) <= self.tolerances.volume and all(
+            coupling.settled(residual) for coupling in self.system.couplings
+        )
+        if size <= self.tolerances.displacement and settled:
             return Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= self.tolerances.iterations:
             return Reason.DIVERGED_MAX_IT

@@ -48,7 +48,7 @@ class Statics:
         set_options(snes, SNES_OPTIONS)
         counts = self.newton.counts if hasattr(self, "newton") else None
         self.newton = Newton(self.system, snes, self._tolerances, counts)
-        self._solution = PETSc.Vec().createSeq(self.system.space.size)
+        self._solution = PETSc.Vec().createSeq(self.system.size)
         snes.setFunction(self.newton.careful(self._function), self._solution.duplicate())
         snes.setJacobian(self.newton.careful(self._jacobian), self.newton.matrix)
 
@@ -61,7 +61,7 @@ class Statics:
         self, snes: PETSc.SNES, state: PETSc.Vec, matrix: PETSc.Mat, _: PETSc.Mat
     ) -> None:
         self.system.set_state(self.time, state.array_r)
-        self.newton.jacobian(matrix, (), lambda: self.system.jacobian(matrix))
+        self.newton.jacobian(matrix, (), lambda: self.system.jacobian(matrix, time_end=self.time))
 
     def load_steps(self, first: float = 1.0, smallest: float = 1e-4) -> Iterator[State]:
         """Raise the loads to their full size; yields each equilibrium on the way.
@@ -76,7 +76,7 @@ class Statics:
         NotConverged : with the load factor reached and the most distorted cells.
         """
         factor, increment = 0.0, first
-        accepted = np.zeros(self.system.space.size)
+        accepted = np.zeros(self.system.size)
         slope = np.zeros_like(accepted)
         while factor < 1.0:
             increment = min(increment, 1.0 - factor)
@@ -113,8 +113,10 @@ class Statics:
             self.newton.reraise(error)
             self._connect()
             return False, 0
-        reason = self.newton.snes.getConvergedReason()
-        return reason > 0, self.newton.snes.getIterationNumber()
+        converged = self.newton.snes.getConvergedReason() > 0 and not any(
+            part.refusal(self.time, self._solution.array_r) for part in self.system.couplings
+        )
+        return converged, self.newton.snes.getIterationNumber()
 
     def _state(self, factor: float, mixed: np.ndarray, step: float, iterations: int) -> State:
         return self.system.state_of(factor, mixed, np.zeros_like(mixed), step, iterations)

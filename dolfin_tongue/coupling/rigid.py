@@ -1,0 +1,148 @@
+"""Rigid bodies in the mixed system: attached nodes follow, their forces act on the body (61), (62).
+
+By the principle of virtual power the nodes' rows of momentum R_k, which the motion of the body
+replaces, appear as T_k^T R_k in the rows of its coordinates, T = d(displacement)/dq. So the body
+feels exactly the forces and moments that it exerts: there is no iteration between two systems.
+Momentum is stated at the stage; the motion of the nodes at the end of the step, like all supports.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.coupling.base import Arguments, Coupling, Shifts, Sparse, scattered
+from dolfin_tongue.mesh import MixedSpace
+from dolfin_tongue.rigid import plane
+from dolfin_tongue.rigid.loads import Loads
+from dolfin_tongue.scene import Scene
+
+
+class RigidBodies(Coupling):
+    """All rigid bodies of a scene, three coordinates each."""
+
+    def __init__(self, scene: Scene, space: MixedSpace, begin: int):
+        self.bodies = scene.rigid_bodies
+        self.loads = Loads(self.bodies, scene.gravity)
+        self.positions = begin + np.arange(3 * len(self.bodies))
+        self._given = np.concatenate([body.given for body in self.bodies])
+        self._at = [slice(3 * i, 3 * i + 3) for i in range(len(self.bodies))]
+        dofs, arms = [], []
+        for body in self.bodies:
+            nodes = body.nodes(space.body)
+            groups, corners = space.held(nodes), space.body.points[nodes]
+            dofs.append(np.concatenate([part for part, _ in groups]).astype(np.int64))
+            arms.append(body.arms(np.concatenate([corners[c].mean(axis=1) for _, c in groups])))
+        self._dofs, self._arms = dofs, arms
+        self.dofs = np.concatenate(dofs).astype(np.int32)
+
+    def _own(self, y: FloatArray) -> FloatArray:
+        return y[self.positions]
+
+    def displacement(self, q: FloatArray) -> FloatArray:
+        """Displacement of all attached dofs, shape (k, 3), m."""
+        parts = zip(self._arms, self._at, strict=True)
+        return np.concatenate([plane.displacement(arms, q[at]) for arms, at in parts])
+
+    def spread(self, q: FloatArray, size: int) -> Sparse:
+        """T as a sparse matrix from coordinates to mixed arrays, shape (size, 3b)."""
+        parts = zip(self._arms, self._at, strict=True)
+        return self._spread([plane.jacobian(arms, q[at]) for arms, at in parts], size)
+
+    def _spread(self, blocks: list[FloatArray], size: int) -> Sparse:
+        """Blocks of shape (k, 3, 3), body after body, as a sparse matrix."""
+        rows, columns = [], []
+        for dofs, at in zip(self._dofs, self._at, strict=True):
+            rows.append(np.repeat(dofs.ravel(), 3))
+            columns.append(np.tile(np.arange(at.start, at.stop), dofs.size))
+        place = (np.concatenate(rows), np.concatenate(columns))
+        values = np.concatenate([block.ravel() for block in blocks])
+        return sp.coo_array((values, place), shape=(size, len(self.positions))).tocsr()
+
+    def tissue_force(self, q: FloatArray, rows: FloatArray) -> FloatArray:
+        """Return forces and moments of the tissue on the coordinates, shape (3b,), N and N m.
+
+        Parameters
+        ----------
+        q : coordinates.
+        rows : residual with the nodes' rows of momentum.
+        """
+        return -(self.spread(q, len(rows)).T @ rows)
+
+    def balance(self, at: Arguments, rows: FloatArray) -> FloatArray:
+        """Inertia minus all forces on the coordinates (61), (62), shape (3b,), N and N m.
+
+        Zero for free coordinates; for prescribed ones what has to be exerted.
+        """
+        q, v, a = self._own(at.state), self._own(at.rate), self._own(at.acceleration)
+        forces = at.load * self.loads.force(at.time, q, v) + self.tissue_force(q, rows)
+        return self.loads.inertia(q, v, a) - forces
+
+    def work(self, at: Arguments, rows: FloatArray, way: FloatArray) -> float:
+        """Work of what prescribes coordinates on the way of the mixed unknowns, J."""
+        return float((self.balance(at, rows) * self._own(way))[self._given].sum())
+
+    def prescribed(self, time: float) -> FloatArray:
+        """Value, rate and acceleration of the prescribed coordinates, shape (3, 3b)."""
+        return np.concatenate([body.prescribed(time) for body in self.bodies], axis=1)
+
+    def add_residual(self, at: Arguments, out: FloatArray) -> None:
+        """Motion of the attached nodes, balance (61), (62) of the bodies."""
+        own, end = self.balance(at, out), self._own(at.end)
+        own[self._given] = (end - self.prescribed(at.time_end)[0])[self._given]
+        out[self.positions] = own
+        out[self.dofs] = at.end[self.dofs] - self.displacement(end)
+
+    def pattern(self, entries: Sparse) -> Sparse:
+        """Own rows gather those of the nodes; nodes depend on their body."""
+        size = entries.shape[0]
+        may = np.array([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 1.0, 1.0]])  # as in `plane`
+        spread = self._spread([np.tile(may, (len(dofs), 1, 1)) for dofs in self._dofs], size)
+        wide = self._placed(spread.T, size)
+        own = scattered(self.positions[:, None], self.positions, 1.0, size)
+        return entries + wide @ entries + wide.T + own
+
+    def _placed(self, rows: Sparse, size: int) -> Sparse:
+        """Rows (3b, size) at the places of the own rows in a square matrix."""
+        rows = rows.tocoo()
+        place = (self.positions[rows.coords[0]], rows.coords[1])
+        return sp.coo_array((rows.data, place), shape=(size, size)).tocsr()
+
+    def with_tangent(
+        self, matrix: Sparse, at: Arguments, shifts: Shifts, rows: FloatArray
+    ) -> Sparse:
+        """Add the derivatives; the rows of nodes are gathered and then replaced."""
+        size = matrix.shape[0]
+        q, v, a = self._own(at.state), self._own(at.rate), self._own(at.acceleration)
+        inertia_q, inertia_v = self.loads.inertia_tangents(q, v, a)
+        _, force_q, force_v = self.loads.force_and_tangents(at.time, q, v)
+        own = inertia_q - at.load * force_q + shifts.acceleration * self.loads.mass(q)
+        own += shifts.rate * (inertia_v - at.load * force_v)
+        for dofs, arms, part in zip(self._dofs, self._arms, self._at, strict=True):
+            own[part.start + 2, part.start + 2] += np.sum(plane.bend(arms, q[part]) * rows[dofs])
+        own[self._given] = 0.0
+        own[self._given, self._given] = shifts.end
+        gathered = (self.spread(q, size).T @ matrix).tocsr()
+        gathered = sp.diags_array(1.0 - self._given) @ gathered
+        keep = np.ones(size)
+        keep[self.dofs] = keep[self.positions] = 0.0
+        nodes = shifts.end * (1.0 - keep)
+        nodes[self.positions] = 0.0
+        follow = -shifts.end * self.spread(self._own(at.end), size)
+        return (
+            sp.diags_array(keep) @ matrix
+            + self._placed(gathered, size)
+            + sp.diags_array(nodes)
+            + self._placed(follow.T, size).T
+            + scattered(self.positions[:, None], self.positions, own, size)
+        )
+
+    def energies(self, at: Arguments) -> dict[str, float]:
+        """Kinetic energy of the bodies."""
+        return {"kinetic_rigid": self.loads.kinetic_energy(self._own(at.state), self._own(at.rate))}
+
+    def powers(self, at: Arguments) -> dict[str, float]:
+        """Power of their forces, weight included."""
+        v = self._own(at.rate)
+        return {"rigid_forces": float(v @ self.loads.force(at.time, self._own(at.state), v))}
