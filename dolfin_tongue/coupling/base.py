@@ -86,8 +86,15 @@ class Coupling(ABC):
         """Whether the own rows of a residual are small enough to stop Newton's method."""
         return True
 
-    def refusal(self, time: float, y: FloatArray) -> str:
-        """Why a state must not be accepted as the end of a step; empty if it may."""
+    def refusal(self, time: float, y: FloatArray, before: FloatArray | None = None) -> str:
+        """Why a state must not be accepted as the end of a step; empty if it may.
+
+        Parameters
+        ----------
+        time : s.
+        y : the end of the step.
+        before : its begin; None in statics.
+        """
         return ""
 
     def energies(self, at: Arguments) -> dict[str, float]:

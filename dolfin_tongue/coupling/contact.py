@@ -20,6 +20,9 @@ from dolfin_tongue.coupling.base import Arguments, Coupling, Shifts, Sparse
 from dolfin_tongue.mesh import MixedSpace
 from dolfin_tongue.surfaces.base import Gap
 
+#: Gap, in ranges of the barrier, to which a touching point may go in one step.
+LEAP = 2.0
+
 
 class ContactSurface(Coupling):
     """One `Contact`.
@@ -110,10 +113,20 @@ class ContactSurface(Coupling):
 
     # -- what is watched -----------------------------------------------------------------------
 
-    def refusal(self, time: float, y: FloatArray) -> str:
-        """Name a point that has come through."""
-        smallest = float(self.gap(time, y).distance.min())
-        return "" if smallest > 0 else f"penetration of {-smallest:.2g} m at {self.label}"
+    def refusal(self, time: float, y: FloatArray, before: FloatArray | None = None) -> str:
+        """Name a point that has come through, or one that has left the barrier at one bound.
+
+        The method of time stepping remembers the acceleration of a touching point for a step; a
+        long step would turn it into a leap.
+        """
+        gap, law = self.gap(time, y).distance, self.term.law
+        if not gap.min() > 0:
+            return f"penetration of {-gap.min():.2g} m at {self.label}"
+        if law.rated or before is None or not (gap > LEAP * law.range).any():
+            return ""
+        touching = self.gap(time, before).distance < law.range
+        leaps = touching & (gap > LEAP * law.range)
+        return f"a leap off the obstacle at {self.label}" if leaps.any() else ""
 
     def energies(self, at: Arguments) -> dict[str, float]:
         """Energy of a law that has one."""

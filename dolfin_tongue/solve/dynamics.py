@@ -267,7 +267,7 @@ class Dynamics:
     def _advance(self, state: State, dt: float, end: float) -> tuple[State, float | None]:
         """Take one step of at most dt, cutting it where Newton fails or the error is too large."""
         iterations = self.newton.iterations
-        begin = self._snapshot()
+        self._begin = begin = self._snapshot()
         rolled_back = False
         while True:
             self.ts.setTimeStep(dt)
@@ -310,7 +310,8 @@ class Dynamics:
         body, displacement = self.system.scene.body, self.system.displacement(y)
         if not (gauss_jacobians(body.points + displacement, body.cells) > 0).all():
             return INVERTED
-        refused = any(part.refusal(self.ts.getTime(), y) for part in self.system.couplings)
+        time, before = self.ts.getTime(), self._begin[0]
+        refused = any(part.refusal(time, y, before) for part in self.system.couplings)
         return PENETRATED if refused else reason
 
     def _cut(self, dt: float, error: float | None) -> float:
