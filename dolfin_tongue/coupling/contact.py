@@ -1,4 +1,4 @@
-"""Contact in the mixed system: tractions at the quadrature points of a surface (58)-(60).
+"""Contact in the mixed system: tractions at the points of a surface (58)-(60).
 
 The traction of a law without rates, a barrier, is stated for the *end* of a step. Its energy is
 convex, so that over a step the change of that energy is at most the work done against the traction:
@@ -6,6 +6,9 @@ a step that jumps into the barrier loses energy and never gains any, whatever it
 the stage, an impact that dt does not resolve would throw the body back with energy of its own. The
 price is order 1 in the traction while it changes; the report's own law (60) is inelastic too.
 A rated law is stated at the stage, like all rates.
+
+The points are those of a rule with points at the nodes: between Gauss points a corner or an edge
+would pass a fifth of a face deep.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import basix
 import numpy as np
 import scipy.sparse as sp
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.coupling.base import Arguments, Coupling, Shifts, Sparse
 from dolfin_tongue.mesh import MixedSpace
@@ -29,86 +32,103 @@ class ContactSurface(Coupling):
 
     Attributes
     ----------
-    points : reference positions of the quadrature points, shape (q, 3), m.
+    points : reference positions of the points, shape (q, 3), m.
     weights : reference area of each, shape (q,), m2.
     """
 
     def __init__(self, term: Contact, space: MixedSpace, label: str):
-        self.term, self.label = term, label
-        values, dofs, self.points, self.weights = surface_points(space, term.surface)
-        used, columns = np.unique(dofs[..., 0], return_inverse=True)
-        order = np.argsort(space.all_displacement_dofs[:, 0])
-        first = order[np.searchsorted(space.all_displacement_dofs[:, 0], used, sorter=order)]
-        #: The displacement dofs of the surface, shape (k, 3).
-        self.dofs = space.all_displacement_dofs[first]
-        count = len(self.points)
-        rows = np.repeat(np.arange(count), values.shape[-1])
-        place = (rows, columns.reshape(dofs.shape[:2])[:, None].repeat(values.shape[1], 1).ravel())
-        #: From nodal values to values at the points, shape (q, k).
-        self.shapes = sp.coo_array((values.ravel(), place), shape=(count, len(used))).tocsr()
-        self.transposed = self.shapes.T.tocsr()
+        self.term, self.label, self._size = term, label, space.size
+        self.points, self.weights, self._moves, self._hats = surface_points(space, term.surface)
+        self._gathers = self._moves.T.tocsr()
+        self._dofs = np.unique(self._moves.indices)
+        #: How far a point may move when no unknown moves farther than 1.
+        self._reach = np.sqrt(3) * float(np.abs(self._moves).sum(axis=1).max())
+        self._known: tuple[FloatArray, FloatArray, float] | None = None
 
     # -- state at the points -------------------------------------------------------------------
 
     def gap(self, time: float, y: FloatArray) -> Gap:
-        """Gap of the points at a displacement."""
-        x = self.points + self.shapes @ y[self.dofs] - self.term.shift(time)[0]
-        return self.term.obstacle.gap(x)
+        """Gap of all points at a displacement."""
+        shift = self.term.shift(time)[0]
+        gap = self.term.obstacle.gap(self.points + self._at_points(y) - shift)
+        clearance = gap.distance.min() - self.term.law.range
+        if clearance > 0 and np.isfinite(gap.distance).all():
+            self._known = (y[self._dofs], shift, clearance)
+        return gap
 
-    def _approach(self, time: float, rate: FloatArray) -> FloatArray:
-        """Velocity of the points relative to the obstacle, shape (q, 3), m/s."""
-        return self.shapes @ rate[self.dofs] - self.term.shift(time)[1]
+    def _at_points(self, values: FloatArray) -> FloatArray:
+        return (self._moves @ values[: self._size]).reshape(-1, 3)
+
+    def _clear(self, time: float, y: FloatArray) -> bool:
+        """Whether no point can be in range: none moved as far as all were beyond it.
+
+        A signed distance changes by at most what the point moves. This spares most of the cost
+        where nothing touches.
+        """
+        if self._known is None:
+            return False
+        before, shift, clearance = self._known
+        way = self._reach * float(np.abs(y[self._dofs] - before).max())
+        return way + float(np.linalg.norm(self.term.shift(time)[0] - shift)) < clearance
 
     def traction(
         self, at: Arguments
-    ) -> tuple[Gap, FloatArray, FloatArray, FloatArray | float, FloatArray]:
-        """Gap, traction, Pa, its slopes by gap and rate, and the relative velocity."""
+    ) -> tuple[IntArray, Gap, FloatArray, FloatArray, FloatArray | float, FloatArray]:
+        """Points in range; there: gap, traction, Pa, its slopes by gap and rate, and velocity."""
         law = self.term.law
-        if not law.rated:
-            gap = self.gap(at.time_end, at.end)
-            return (gap, *law.traction(gap.distance, None), np.zeros((0, 3)))
-        gap, velocity = self.gap(at.time, at.state), self._approach(at.time, at.rate)
+        time, y = (at.time, at.state) if law.rated else (at.time_end, at.end)
+        if self._clear(time, y):
+            near, gap = _part(None)
+        else:
+            near, gap = _part(self.gap(time, y), law.range)
+        if not law.rated or not near.size:
+            nothing = np.zeros((near.size, 3))
+            return (near, gap, *law.traction(gap.distance, nothing[:, 0]), nothing)
+        velocity = self._at_points(at.rate)[near] - self.term.shift(at.time)[1]
         rate = (gap.normal * velocity).sum(axis=1)
-        return (gap, *law.traction(gap.distance, rate), velocity)
+        return (near, gap, *law.traction(gap.distance, rate), velocity)
+
+    def _push(self, at: Arguments) -> tuple[IntArray, FloatArray]:
+        """Points in range and the forces on them, N."""
+        near, gap, traction, *_ = self.traction(at)
+        return near, (self.weights[near] * traction)[:, None] * gap.normal
 
     # -- residual and tangent ------------------------------------------------------------------
 
     def add_residual(self, at: Arguments, out: FloatArray) -> None:
         """-int t n.w dA in rows of u, N."""
-        gap, traction, *_ = self.traction(at)
-        if traction.any():
-            push = (self.weights * traction)[:, None] * gap.normal
-            out[self.dofs] -= self.transposed @ push
+        near, push = self._push(at)
+        if near.size:
+            force = np.zeros_like(self.points)
+            force[near] = push
+            out[: self._size] -= self._gathers @ force.ravel()
 
     def with_tangent(
         self, matrix: Sparse, at: Arguments, shifts: Shifts, rows: FloatArray
     ) -> Sparse:
         """Add the derivatives by the displacement of the stage or of the end, and by the rate."""
-        gap, traction, by_gap, by_rate, velocity = self.traction(at)
-        touching = np.flatnonzero(traction != 0)
-        if not touching.size:
+        near, gap, traction, by_gap, by_rate, velocity = self.traction(at)
+        if not near.size:
             return matrix
-        n, H = gap.normal[touching], gap.curvature[touching]
-        weight = -self.weights[touching][:, None, None]
+        n, H = gap.normal, gap.curvature
         outer = n[:, :, None] * n[:, None, :]
-        block = by_gap[touching][:, None, None] * outer + traction[touching][:, None, None] * H
+        block = by_gap[:, None, None] * outer + traction[:, None, None] * H
         if self.term.law.rated:
-            slope = np.asarray(by_rate)[touching][:, None, None]
-            turning = np.einsum("qi,qjk,qk->qij", n, H, velocity[touching])
+            slope = np.asarray(by_rate)[:, None, None]
+            turning = np.einsum("qi,qjk,qk->qij", n, H, velocity)
             block = block + slope * (turning + shifts.rate * outer)
         else:
             block = shifts.end * block
-        return matrix + self._spread(touching, weight * block, matrix.shape[0])
+        return matrix + self._spread(near, -self.weights[near, None, None] * block, matrix.shape[0])
 
-    def _spread(self, touching: FloatArray, blocks: FloatArray, size: int) -> Sparse:
+    def _spread(self, near: IntArray, blocks: FloatArray, size: int) -> Sparse:
         """Sum over points of N_K N_L times a block, as a matrix of mixed arrays."""
-        shapes = self.shapes[touching]
-        total = sp.csr_array((size, size))
-        for i in range(3):
-            for j in range(3):
-                part = (shapes.T @ (sp.diags_array(blocks[:, i, j]) @ shapes)).tocoo()
-                place = (self.dofs[part.coords[0], i], self.dofs[part.coords[1], j])
-                total = total + sp.coo_array((part.data, place), shape=(size, size)).tocsr()
+        places = np.arange(3 * near.size).reshape(-1, 3)
+        starts = np.arange(0, 9 * near.size + 1, 3)
+        middle = sp.csr_array((blocks.ravel(), np.repeat(places, 3, axis=0).ravel(), starts))
+        moves = self._moves[(3 * near[:, None] + [0, 1, 2]).ravel()]
+        total = (moves.T @ (middle @ moves)).tocsr()
+        total.resize((size, size))
         return total
 
     # -- what is watched -----------------------------------------------------------------------
@@ -119,85 +139,150 @@ class ContactSurface(Coupling):
         The method of time stepping remembers the acceleration of a touching point for a step; a
         long step would turn it into a leap.
         """
-        gap, law = self.gap(time, y).distance, self.term.law
+        law = self.term.law
+        bounded = law.rated or before is None or self._clear(time, before)
+        if bounded and self._clear(time, y):
+            return ""
+        gap = self.gap(time, y).distance
         if not gap.min() > 0:
             return f"penetration of {-gap.min():.2g} m at {self.label}"
-        if law.rated or before is None or not (gap > LEAP * law.range).any():
+        if bounded or not (gap > LEAP * law.range).any():
             return ""
+        assert before is not None
         touching = self.gap(time, before).distance < law.range
         leaps = touching & (gap > LEAP * law.range)
         return f"a leap off the obstacle at {self.label}" if leaps.any() else ""
 
     def energies(self, at: Arguments) -> dict[str, float]:
         """Energy of a law that has one."""
-        if self.term.law.rated:
+        law = self.term.law
+        if law.rated:
             return {}
-        energy = self.term.law.energy(self.gap(at.time, at.state).distance)
-        return {self.label: float(self.weights @ energy)}
+        if self._clear(at.time, at.state):
+            return {self.label: 0.0}
+        near, gap = _part(self.gap(at.time, at.state), law.range)
+        return {self.label: float(self.weights[near] @ law.energy(gap.distance))}
 
     def powers(self, at: Arguments) -> dict[str, float]:
         """Power of a rated law, and of an obstacle that moves."""
         if not self.term.law.rated and self.term.motion is None:
             return {}
-        gap, traction, *_ = self.traction(at)
-        push = (self.weights * traction)[:, None] * gap.normal
+        near, push = self._push(at)
         if self.term.law.rated:
-            return {self.label: float(np.sum(push * (self.shapes @ at.rate[self.dofs])))}
+            return {self.label: float(np.sum(push * self._at_points(at.rate)[near]))}
         return {f"{self.label}_motion": float(push.sum(axis=0) @ self.term.shift(at.time)[1])}
 
     def observed(self, at: Arguments) -> dict[str, float]:
         """Area in contact, resultant on the tissue, largest pressure, smallest gap."""
-        gap, traction, *_ = self.traction(at)
-        force = ((self.weights * traction)[:, None] * gap.normal).sum(axis=0)
+        smallest = self.gap(at.time, at.state).distance.min()
+        near, gap, traction, *_ = self.traction(at)
+        force = (self.weights[near] * traction) @ gap.normal
         names = (f"{self.label}_force_{axis}_N" for axis in "xyz")
         return {
-            f"{self.label}_area_m2": float(self.weights[gap.distance < self.term.law.range].sum()),
+            f"{self.label}_area_m2": float(self.weights[near].sum()),
             **{name: float(value) for name, value in zip(names, force, strict=True)},
-            f"{self.label}_pressure_Pa": float(traction.max()),
-            f"{self.label}_gap_m": float(gap.distance.min()),
+            f"{self.label}_pressure_Pa": float(traction.max(initial=0.0)),
+            f"{self.label}_gap_m": float(smallest),
         }
+
+    def pressure_map(self, at: Arguments) -> FloatArray:
+        """Traction at the nodes of the body, shape (n,), Pa; zero away from the surface.
+
+        Means over the points, weighted with trilinear shape functions: their integral over the
+        surface is the sum of all tractions times areas.
+        """
+        near, _, traction, *_ = self.traction(at)
+        force = (self.weights[near] * traction) @ self._hats[near]
+        area = self.weights @ self._hats
+        return np.divide(force, area, out=np.zeros_like(area), where=area > 0)
+
+
+def _part(gap: Gap | None, reach: float = 0.0) -> tuple[IntArray, Gap]:
+    """Points nearer than a distance, and their gaps."""
+    if gap is None:
+        nothing = np.zeros((0, 3, 3))
+        return np.zeros(0, dtype=np.int64), Gap(nothing[:, 0, 0], nothing[:, 0], nothing)
+    near = np.flatnonzero(~(gap.distance >= reach))  # a NaN is to be noticed
+    return near, Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
+
+
+#: Of the triangle: corners, middles of edges, centre; exact to degree 3.
+TRIANGLE = (
+    np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]]),
+    np.array([1, 1, 1, 8 / 3, 8 / 3, 8 / 3, 9]) / 40,
+)
+
+
+def _rule(facet: basix.CellType, degree: int) -> tuple[FloatArray, FloatArray]:
+    """Points on a facet, some at its nodes, and positive weights.
+
+    Simpson's rule on quadrilaterals (degree 1), Gauss-Lobatto with four points (degree 2).
+    """
+    if facet == basix.CellType.triangle:
+        return TRIANGLE
+    rule = basix.make_quadrature(facet, 2 * degree + 1, rule=basix.QuadratureType.gll)
+    return np.asarray(rule[0]), np.asarray(rule[1])
 
 
 def surface_points(
     space: MixedSpace, surface: str
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Quadrature points on a surface of the reference body.
+) -> tuple[FloatArray, FloatArray, Sparse, Sparse]:
+    """Points on a surface of the reference body; one that several facets share is one point.
 
     Returns
     -------
-    values : ndarray, shape (f, q, k) -- shape functions of the displacement at the points.
-    dofs : ndarray, shape (f, k, 3) -- their dofs.
-    points : ndarray, shape (f q, 3), m.
-    weights : ndarray, shape (f q,), m2.
+    points : ndarray, shape (q, 3), m.
+    weights : ndarray, shape (q,), m2.
+    moves : sparse, shape (3 q, size of the mixed space) -- from unknowns to displacements there.
+    hats : sparse, shape (q, n) -- from values at the nodes of the body, linear in between.
     """
     cell = basix.CellType[space.pair.shape]
     facets = space.facets(space.body.surface(surface))
-    facet_type = basix.cell.subentity_types(cell)[2][0]
-    rule, rule_weights = map(
-        np.asarray, basix.make_quadrature(facet_type, space.pair.quadrature_degree)
-    )
+    rule, rule_weights = _rule(basix.cell.subentity_types(cell)[2][0], space.pair.degree)
     corners, topology = np.asarray(basix.geometry(cell)), basix.topology(cell)[2]
-    element = space.displacement_element
+    element, geometry = space.displacement_element, space.mesh.geometry
     linear = basix.create_element(basix.ElementFamily.P, cell, 1)
-    values, dofs, points, weights = [], [], [], []
+    points, weights, moves, hats = [], [], [], []
     for local, vertices in enumerate(topology):
         cells = facets[facets[:, 1] == local, 0]
         if not len(cells):
             continue
-        origin = corners[vertices[0]]
-        axes = corners[vertices[1:3]] - origin
-        master = origin + rule @ axes
+        axes = corners[vertices[1:3]] - corners[vertices[0]]
+        master = corners[vertices[0]] + rule @ axes
         closure = element.entity_closure_dofs[2][local]
-        table = np.asarray(element.tabulate(0, master))[0, :, :, 0]
+        table = np.asarray(element.tabulate(0, master))[0, :, closure, 0].T
         flat = np.asarray(linear.tabulate(1, master))[:, :, :, 0]
-        x = space.mesh.geometry.x[space.mesh.geometry.dofmap[cells]]
+        x = geometry.x[geometry.dofmap[cells]]
         tangents = np.einsum("ai,iqk,fkc->fqac", axes, flat[1:], x)
         area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=-1)
-        values.append(np.broadcast_to(table[:, closure], (len(cells), len(rule), len(closure))))
-        dofs.append(space.cell_displacement_dofs(cells)[:, closure])
         points.append(np.einsum("qk,fkc->fqc", flat[0], x).reshape(-1, 3))
         weights.append((area * rule_weights).ravel())
-    return (
-        np.concatenate(values), np.concatenate(dofs), np.concatenate(points),
-        np.concatenate(weights),
-    )  # fmt: skip
+        dofs = space.cell_displacement_dofs(cells)[:, closure]
+        nodes = np.asarray(geometry.input_global_indices)[geometry.dofmap[cells]][:, vertices]
+        moves.append(_table(table, dofs.transpose(0, 2, 1), space.size))
+        hats.append(_table(flat[0][:, vertices], nodes[:, None], len(space.body.points)))
+    return _merged(
+        np.concatenate(points), np.concatenate(weights), sp.vstack(moves), sp.vstack(hats)
+    )
+
+
+def _table(values: FloatArray, columns: IntArray, size: int) -> Sparse:
+    """Matrix of values (q, k) at columns (f, c, k); a row for each facet, point and component."""
+    shape = (len(columns), len(values), *columns.shape[1:])
+    column = np.broadcast_to(columns[:, None], shape).reshape(-1, shape[-1])
+    value = np.broadcast_to(values[None, :, None], shape).reshape(-1, shape[-1])
+    rows, k = np.nonzero(np.abs(value) > 1e-12)
+    place = (rows, column[rows, k])
+    return sp.coo_array((value[rows, k], place), shape=(len(value), size)).tocsr()
+
+
+def _merged(
+    points: FloatArray, weights: FloatArray, moves: Sparse, hats: Sparse
+) -> tuple[FloatArray, FloatArray, Sparse, Sparse]:
+    """Each point once; equal are those that move alike, whatever the motion."""
+    moves = moves.tocsr()
+    trial = np.random.default_rng(0).random(moves.shape[1])
+    key = (moves @ trial).reshape(-1, 3).round(9)
+    _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    rows = (3 * first[:, None] + [0, 1, 2]).ravel()
+    return points[first], np.bincount(group.ravel(), weights), moves[rows], hats.tocsr()[first]
