@@ -16,7 +16,7 @@ from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.boundary.attached import Attached
 from dolfin_tongue.compile import compile_form
-from dolfin_tongue.coupling import Arguments
+from dolfin_tongue.coupling import Arguments, ContactSurface
 from dolfin_tongue.shape import gauss_jacobians
 from dolfin_tongue.state import State
 from dolfin_tongue.system import System, labels_of
@@ -46,6 +46,15 @@ def landmark_positions(body: Body, state: State) -> dict[str, FloatArray]:
     return {
         name: body.points[node] + state.displacement[node] for name, node in body.landmarks.items()
     }
+
+
+def contact_pressures(system: System, state: State) -> dict[str, FloatArray]:
+    """Pressure of each contact at the nodes, shape (n,), Pa, by the name it has in the table."""
+    y, rate = system.vectors(state)
+    system.set_state(state.time, y, rate, np.zeros_like(rate), y)
+    at = system.arguments(state.time)
+    parts = [part for part in system.couplings if isinstance(part, ContactSurface)]
+    return {part.label: part.pressure_map(at) for part in parts}
 
 
 class EnergyAudit:
