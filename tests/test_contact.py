@@ -345,7 +345,8 @@ def test_pressure_map(pair):
     assert not np.delete(even, bottom).any() and not np.delete(tilted, bottom).any()
     rows = tilted[bottom].reshape(3, 5)
     assert (np.diff(rows, axis=1) < 0).all()  # the gap grows with x
-    shares = np.outer([1, 2, 1], [1, 2, 2, 2, 1]) * 4e-4 / 32
+    shares = (system.couplings[1].weights @ system.couplings[1]._hats)[bottom].reshape(3, 5)
+    assert shares.sum() == pytest.approx(4e-4, rel=1e-12)
     shown = system.couplings[1].observed(system.arguments(0.0))
     total = np.hypot(shown["contact_2_force_x_N"], shown["contact_2_force_z_N"])
     assert (rows * shares).sum() == pytest.approx(total, rel=1e-12)
@@ -353,10 +354,11 @@ def test_pressure_map(pair):
 
 # -- impacts --------------------------------------------------------------------------------------
 
+DEFAULT = Barrier()
 TURNS = {"flat": (0.0, 0.0), "edge": (0.0, 30.0), "corner": (30.0, 39.0)}
 
 
-def dropped(turn, law=Barrier()):
+def dropped(turn, law=DEFAULT):
     """A block 1 mm above a plane."""
     body = block_body((0.02, 0.02, 0.01), (4, 4, 2))
     matrix = Rotation.from_euler("xy", TURNS[turn], degrees=True).as_matrix()
@@ -411,33 +413,33 @@ def test_impact(turn, speed, dt):
     kinetic = 0.5 * mass * speed**2
     assert np.diff(energies).max() <= 1e-12 * kinetic
     assert energies[-1] < energies[0] - 0.5 * kinetic
-    # the plain sum of the impulses misses what the method keeps of the last acceleration
-    assert np.abs(mean - [0, 0, -speed] - impulse).max() <= 2e-2 * speed
+    # the plain sum of impulses misses (af - 1/2) b of every change of dt (up to 3 % here)
+    assert np.abs(mean - [0, 0, -speed] - impulse).max() <= 5e-2 * speed
 
 
 def test_report_law_stops_a_drop_but_lets_it_creep():
     """(60) loses energy while the gap closes and does no work while it opens; a barrier holds."""
-    sunk = {}
+    last = {}
     for beside in (False, True):
         scene = dropped("flat", ReportContact(1e8, 1.0, 1.0, 5e-4))
         if beside:
-            scene = replace(scene, terms=(*scene.terms, Contact(Plane(), law=Barrier(1e-4))))
+            scene = replace(scene, terms=(*scene.terms, Contact(Plane(), "z0", Barrier(3e-4))))
         dynamics = Dynamics(scene, TimeSteps(2e-3))
         audit = EnergyAudit(dynamics.system)
         start = dynamics.rest()
         start = replace(start, velocity=np.tile([0, 0, -0.1], (len(scene.body.points), 1)))
         label = "contact_1" if beside else "contact"
         gaps, works = [], []
-        for state in dynamics.march(0.12, start):
+        for state in dynamics.march(0.2, start):
             record = audit.update(state)
             gaps.append(record[f"{label}_gap_m"])
             works.append(record[f"work_{label}_J"])
         assert min(gaps) > 0
         assert np.diff(works).max() <= 1e-15 and works[-1] < -1e-6
-        sunk[beside] = np.array(gaps)
-    late = sunk[False][-20:]
-    assert (np.diff(late) < 0).all()  # creeps through, ever slower
-    assert abs(np.diff(sunk[True][-20:])).max() < np.abs(np.diff(late)).max() / 10
+        last[beside] = np.array(gaps[-20:])
+    assert (np.diff(last[False]) < 0).all() and last[False][-1] < 1.5e-4
+    resting = 3e-4 / (1 + np.sqrt(9.81 * scene.body.mass / 4e-4 / 1e3))
+    assert last[True] == pytest.approx(resting, rel=0.2)  # the pressure is not uniform
 
 
 def test_moving_obstacle_gives_the_work_that_the_body_takes():
@@ -456,3 +458,88 @@ def test_moving_obstacle_gives_the_work_that_the_body_takes():
         assert record["work_contact_motion_J"] == pytest.approx(lifted, rel=0.03)
         errors.append(abs(record["balance_J"]) / lifted)
     assert errors[1] < errors[0] / 2 and errors[1] < 1e-2
+
+
+# -- Hertz ----------------------------------------------------------------------------------------
+
+BALL, MU = 0.01, 1000.0
+
+
+def graded_ball(cells):
+    """A ball with small cells at both poles; five nodes in its middle for statics to hold."""
+    body = ball_body(BALL, cells)
+    r = np.linalg.norm(body.points, axis=1)
+    polar = np.arccos(np.clip(body.points[:, 2] / np.maximum(r, 1e-30), -1, 1))
+    azimuth = np.arctan2(body.points[:, 1], body.points[:, 0])
+    from_equator = 1 - np.abs(1 - polar / (np.pi / 2))  # 0 at the poles, 1 at the equator
+    graded = np.sinh(4 * from_equator) / np.sinh(4.0) * np.pi / 2
+    polar = np.where(polar <= np.pi / 2, graded, np.pi - graded)
+    r = BALL * (1 - np.sinh(3 * (1 - r / BALL)) / np.sinh(3.0))
+    directions = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
+    points = r[:, None] * np.stack(directions, axis=1)
+    off = np.abs(points[:, 2]) > 1e-12
+    core = np.argsort(r + off)[:5]
+    return replace(body, points=points, node_sets={"core": core})
+
+
+def squeezed(cells, share):
+    """Force and radius of contact of a ball between two planes, over Hertz and over Tatara.
+
+    nu = 1/2: E = 3 mu, E* = E/(1 - nu^2) = 4 mu; Hertz: a^2 = R d, F = 16/3 mu a^3 / R for the
+    approach d per plane. Of a whole ball between two planes the far side gives way the less
+    (Tatara 1991): d = a^2/R - F/(pi E) (3 R^2 (a^2 + 4 R^2)^-1.5 + 0.75 (a^2 + 4 R^2)^-0.5).
+    The approach is that of the planes less the mean gap, weighted with the force; range d/50.
+    """
+    d = share * BALL
+    reach = d / 50
+    law = Barrier(reach, 2 / np.pi * 4 * MU * np.sqrt(share), 10.0)
+    way = d + 1.5 * reach
+    planes = [
+        Contact(
+            Plane((0, 0, s * (BALL + reach)), (0, 0, -s)), law=law,
+            motion=(Still(), Still(), SmoothMove(-s * way)),
+        )
+        for s in (1.0, -1.0)
+    ]  # fmt: skip
+    terms = (MooneyRivlin(MU / 2, 0.0, 0.0), *planes)
+    solver = Statics(Scene(graded_ball(cells), terms, (Attached("core"),)))
+    state = solver.solve()
+    system = solver.system
+    system.set_state(solver.time, system.vectors(state)[0])
+    at = system.arguments(solver.time)
+    upper, lower = (part.observed(at) for part in system.couplings)
+    force = -upper["contact_1_force_z_N"]
+    assert lower["contact_2_force_z_N"] == pytest.approx(force, rel=1e-6)  # symmetric
+    near, gap, traction, *_ = system.couplings[0].traction(at)
+    share_of_force = system.couplings[0].weights[near] * traction
+    d += reach / 2 - share_of_force @ gap.distance / share_of_force.sum()
+
+    def approach(a):
+        far, load = a**2 + 4 * BALL**2, 16 / 3 * MU * a**3 / BALL
+        return a**2 / BALL - load / (3 * np.pi * MU) * (3 * BALL**2 / far**1.5 + 0.75 / far**0.5)
+
+    a = brentq(lambda a: approach(a) - d, 0.0, BALL / 2)
+    radius = np.sqrt(upper["contact_1_area_m2"] / np.pi)
+    hertz = 16 / 3 * MU * np.sqrt(BALL) * d**1.5
+    return force / hertz, force / (16 / 3 * MU * a**3 / BALL), radius / np.sqrt(BALL * d)
+
+
+def test_hertz():
+    """864 cells: 3 cells across the radius of contact at d = R/50, so about 5 % in the force."""
+    hertz, tatara, radius = squeezed(6, 0.02)
+    assert 1.05 < hertz < 1.2  # a/R = 0.14: a whole ball is stiffer than a half space by 10 %
+    assert tatara == pytest.approx(1.0, abs=0.1)
+    assert radius == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.slow
+def test_hertz_converges():
+    """To Tatara's force with the mesh, and to Hertz' as a/R = sqrt(d/R) falls."""
+    rows = {(n, s): squeezed(n, s) for n in (6, 8, 10) for s in (0.005, 0.02, 0.04)}
+    for key, row in rows.items():
+        print(*key, *(f"{value:.4f}" for value in row))
+    error = {n: np.mean([abs(rows[n, s][1] - 1) for s in (0.005, 0.02, 0.04)]) for n in (6, 8, 10)}
+    assert error[10] < error[8] < error[6] and error[10] < 0.02
+    by_load = [rows[10, share][0] for share in (0.005, 0.02, 0.04)]
+    assert 1.0 < by_load[0] < by_load[1] < by_load[2] and by_load[0] < 1.06
+    assert rows[10, 0.02][2] == pytest.approx(1.0, abs=0.06)

@@ -257,10 +257,14 @@ class Dynamics:
             yield state
 
     def _next_step(self, taken: float, error: float | None) -> float:
-        """Next step: the nominal one, or the one that the error estimate allows."""
+        """Next step: the nominal one, or the one that the error estimate allows.
+
+        After a cut steps grow by half at most: the method carries the acceleration of a short step
+        into the next one, and over a step four times as long it would be a push that no force gave.
+        """
         smallest, largest = self.steps.step_limits
         if error is None or self.steps.tolerance is None:
-            return min(self.steps.dt, 4 * taken)
+            return min(self.steps.dt, 1.5 * taken)
         factor = 0.9 * (self.steps.tolerance / max(error, 1e-300)) ** (1 / 3)
         return float(np.clip(taken * np.clip(factor, 0.2, 2.0), smallest, largest))
 
