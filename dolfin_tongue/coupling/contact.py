@@ -13,6 +13,8 @@ would pass a fifth of a face deep.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import basix
 import numpy as np
 import scipy.sparse as sp
@@ -25,6 +27,38 @@ from dolfin_tongue.surfaces.base import Gap
 
 #: Gap, in ranges of the barrier, to which a touching point may go in one step.
 LEAP = 2.0
+
+#: Points that are nearer than this many ranges are looked at until some point has moved as far.
+MARGIN = 10.0
+
+#: No points: an empty list of them, and no gaps.
+NOWHERE = (
+    np.zeros(0, dtype=np.int64), Gap(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """Points that can be in range as long as none has moved farther than `margin`.
+
+    A signed distance changes by at most what its point moves. So an obstacle is asked about few
+    points, and about none while it is far away.
+
+    Parameters
+    ----------
+    u, shift, margin : unknowns of the surface and place of the obstacle when it was made; m.
+    points : numbers of the points.
+    places : their reference positions, m.
+    moves, gathers : from unknowns to their displacements, and from forces on them to rows.
+    """
+
+    u: FloatArray
+    shift: FloatArray
+    margin: float
+    points: IntArray
+    places: FloatArray
+    moves: Sparse
+    gathers: Sparse
 
 
 class ContactSurface(Coupling):
@@ -39,75 +73,98 @@ class ContactSurface(Coupling):
     def __init__(self, term: Contact, space: MixedSpace, label: str):
         self.term, self.label, self._size = term, label, space.size
         self.points, self.weights, self._moves, self._hats = surface_points(space, term.surface)
-        self._gathers = self._moves.T.tocsr()
         self._dofs = np.unique(self._moves.indices)
         #: How far a point may move when no unknown moves farther than 1.
-        self._reach = np.sqrt(3) * float(np.abs(self._moves).sum(axis=1).max())
-        self._known: tuple[FloatArray, FloatArray, float] | None = None
+        self._reach = float(np.sqrt(3) * np.abs(self._moves).sum(axis=1).max())
+        self._watched: Watched | None = None
 
     # -- state at the points -------------------------------------------------------------------
 
     def gap(self, time: float, y: FloatArray) -> Gap:
         """Gap of all points at a displacement."""
-        shift = self.term.shift(time)[0]
-        gap = self.term.obstacle.gap(self.points + self._at_points(y) - shift)
-        clearance = gap.distance.min() - self.term.law.range
-        if clearance > 0 and np.isfinite(gap.distance).all():
-            self._known = (y[self._dofs], shift, clearance)
-        return gap
+        return self._gap(self.points, self._moves, time, y)
 
-    def _at_points(self, values: FloatArray) -> FloatArray:
-        return (self._moves @ values[: self._size]).reshape(-1, 3)
+    def _gap(self, places: FloatArray, moves: Sparse, time: float, y: FloatArray) -> Gap:
+        x = places + (moves @ y[: self._size]).reshape(-1, 3)
+        if self.term.motion is not None:
+            x -= self.term.shift(time)[0]
+        return self.term.obstacle.gap(x)
 
-    def _clear(self, time: float, y: FloatArray) -> bool:
-        """Whether no point can be in range: none moved as far as all were beyond it.
+    def watched(self, time: float, y: FloatArray) -> Watched:
+        """Points that can be in range at a displacement."""
+        old, u = self._watched, y[self._dofs]
+        if old is not None:
+            way = self._reach * float(np.abs(u - old.u).max())
+            if self.term.motion is not None:
+                way += float(np.linalg.norm(self.term.shift(time)[0] - old.shift))
+            if way < old.margin:
+                return old
+        distance = self.gap(time, y).distance
+        margin = max(MARGIN * self.term.law.range, float(distance.min()) - self.term.law.range)
+        margin = margin if np.isfinite(margin) else MARGIN * self.term.law.range
+        # beyond a rim there is no distance to rely on; a NaN is to be noticed
+        far = (distance >= self.term.law.range + margin) & np.isfinite(distance)
+        points = np.flatnonzero(~far)
+        moves = self._moves[_rows(points)]
+        self._watched = Watched(
+            u, self.term.shift(time)[0], margin, points, self.points[points], moves,
+            moves.T.tocsr(),
+        )  # fmt: skip
+        return self._watched
 
-        A signed distance changes by at most what the point moves. This spares most of the cost
-        where nothing touches.
-        """
-        if self._known is None:
-            return False
-        before, shift, clearance = self._known
-        way = self._reach * float(np.abs(y[self._dofs] - before).max())
-        return way + float(np.linalg.norm(self.term.shift(time)[0] - shift)) < clearance
+    def _near(self, time: float, y: FloatArray) -> tuple[Watched, IntArray, Gap]:
+        """Points in range, as places among those watched, and their gaps."""
+        watched = self.watched(time, y)
+        if not watched.points.size:
+            return watched, *NOWHERE
+        gap = self._gap(watched.places, watched.moves, time, y)
+        near = np.flatnonzero(~(gap.distance >= self.term.law.range))
+        if not near.size:
+            return watched, *NOWHERE
+        return watched, near, Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
 
-    def traction(
+    def _touched(
         self, at: Arguments
-    ) -> tuple[IntArray, Gap, FloatArray, FloatArray, FloatArray | float, FloatArray]:
-        """Points in range; there: gap, traction, Pa, its slopes by gap and rate, and velocity."""
+    ) -> tuple[Watched, IntArray, Gap, FloatArray, FloatArray, FloatArray | float, FloatArray]:
+        """See `traction`; points as places among those watched."""
         law = self.term.law
         time, y = (at.time, at.state) if law.rated else (at.time_end, at.end)
-        if self._clear(time, y):
-            near, gap = _part(None)
-        else:
-            near, gap = _part(self.gap(time, y), law.range)
-        if not law.rated or not near.size:
-            nothing = np.zeros((near.size, 3))
-            return (near, gap, *law.traction(gap.distance, nothing[:, 0]), nothing)
-        velocity = self._at_points(at.rate)[near] - self.term.shift(at.time)[1]
+        watched, near, gap = self._near(time, y)
+        if not near.size:
+            empty = gap.distance
+            return watched, near, gap, empty, empty, empty, gap.normal
+        if not law.rated:
+            return (watched, near, gap, *law.traction(gap.distance, None), gap.normal)
+        velocity = (watched.moves @ at.rate[: self._size]).reshape(-1, 3)[near]
+        velocity -= self.term.shift(at.time)[1]
         rate = (gap.normal * velocity).sum(axis=1)
-        return (near, gap, *law.traction(gap.distance, rate), velocity)
+        return (watched, near, gap, *law.traction(gap.distance, rate), velocity)
 
-    def _push(self, at: Arguments) -> tuple[IntArray, FloatArray]:
-        """Points in range and the forces on them, N."""
-        near, gap, traction, *_ = self.traction(at)
-        return near, (self.weights[near] * traction)[:, None] * gap.normal
+    def traction(self, at: Arguments) -> tuple[IntArray, Gap, FloatArray]:
+        """Points in range, their gaps, and the traction there, Pa."""
+        watched, near, gap, traction, *_ = self._touched(at)
+        return watched.points[near], gap, traction
+
+    def _push(self, at: Arguments) -> tuple[Watched, FloatArray]:
+        """Return the forces on the points that are watched, N."""
+        watched, near, gap, traction, *_ = self._touched(at)
+        force = np.zeros((watched.points.size, 3))
+        force[near] = (self.weights[watched.points[near]] * traction)[:, None] * gap.normal
+        return watched, force
 
     # -- residual and tangent ------------------------------------------------------------------
 
     def add_residual(self, at: Arguments, out: FloatArray) -> None:
         """-int t n.w dA in rows of u, N."""
-        near, push = self._push(at)
-        if near.size:
-            force = np.zeros_like(self.points)
-            force[near] = push
-            out[: self._size] -= self._gathers @ force.ravel()
+        watched, force = self._push(at)
+        if force.any():
+            out[: self._size] -= watched.gathers @ force.ravel()
 
     def with_tangent(
         self, matrix: Sparse, at: Arguments, shifts: Shifts, rows: FloatArray
     ) -> Sparse:
         """Add the derivatives by the displacement of the stage or of the end, and by the rate."""
-        near, gap, traction, by_gap, by_rate, velocity = self.traction(at)
+        watched, near, gap, traction, by_gap, by_rate, velocity = self._touched(at)
         if not near.size:
             return matrix
         n, H = gap.normal, gap.curvature
@@ -119,19 +176,10 @@ class ContactSurface(Coupling):
             block = block + slope * (turning + shifts.rate * outer)
         else:
             block = shifts.end * block
-        return matrix + self._spread(near, -self.weights[near, None, None] * block, matrix.shape[0])
+        weights = self.weights[watched.points[near], None, None]
+        return matrix + _spread(watched.moves[_rows(near)], -weights * block, matrix.shape[0])
 
-    def _spread(self, near: IntArray, blocks: FloatArray, size: int) -> Sparse:
-        """Sum over points of N_K N_L times a block, as a matrix of mixed arrays."""
-        places = np.arange(3 * near.size).reshape(-1, 3)
-        starts = np.arange(0, 9 * near.size + 1, 3)
-        middle = sp.csr_array((blocks.ravel(), np.repeat(places, 3, axis=0).ravel(), starts))
-        moves = self._moves[(3 * near[:, None] + [0, 1, 2]).ravel()]
-        total = (moves.T @ (middle @ moves)).tocsr()
-        total.resize((size, size))
-        return total
-
-    # -- what is watched -----------------------------------------------------------------------
+    # -- what is shown ------------------------------------------------------------------------
 
     def refusal(self, time: float, y: FloatArray, before: FloatArray | None = None) -> str:
         """Name a point that has come through, or one that has left the barrier at one bound.
@@ -140,17 +188,16 @@ class ContactSurface(Coupling):
         long step would turn it into a leap.
         """
         law = self.term.law
-        bounded = law.rated or before is None or self._clear(time, before)
-        if bounded and self._clear(time, y):
+        watched, near, gap = self._near(time, y)
+        if near.size and not gap.distance.min() > 0:
+            return f"penetration of {-gap.distance.min():.2g} m at {self.label}"
+        if law.rated or before is None:
             return ""
-        gap = self.gap(time, y).distance
-        if not gap.min() > 0:
-            return f"penetration of {-gap.min():.2g} m at {self.label}"
-        if bounded or not (gap > LEAP * law.range).any():
+        watched, near, _ = self._near(time, before)
+        if not near.size:
             return ""
-        assert before is not None
-        touching = self.gap(time, before).distance < law.range
-        leaps = touching & (gap > LEAP * law.range)
+        now = self._gap(watched.places[near], watched.moves[_rows(near)], time, y).distance
+        leaps = (now > LEAP * law.range) & np.isfinite(now)  # over a rim a point may go
         return f"a leap off the obstacle at {self.label}" if leaps.any() else ""
 
     def energies(self, at: Arguments) -> dict[str, float]:
@@ -158,24 +205,24 @@ class ContactSurface(Coupling):
         law = self.term.law
         if law.rated:
             return {}
-        if self._clear(at.time, at.state):
-            return {self.label: 0.0}
-        near, gap = _part(self.gap(at.time, at.state), law.range)
-        return {self.label: float(self.weights[near] @ law.energy(gap.distance))}
+        watched, near, gap = self._near(at.time, at.state)
+        weights = self.weights[watched.points[near]]
+        return {self.label: float(weights @ law.energy(gap.distance))}
 
     def powers(self, at: Arguments) -> dict[str, float]:
         """Power of a rated law, and of an obstacle that moves."""
         if not self.term.law.rated and self.term.motion is None:
             return {}
-        near, push = self._push(at)
+        watched, force = self._push(at)
         if self.term.law.rated:
-            return {self.label: float(np.sum(push * self._at_points(at.rate)[near]))}
-        return {f"{self.label}_motion": float(push.sum(axis=0) @ self.term.shift(at.time)[1])}
+            velocity = watched.moves @ at.rate[: self._size]
+            return {self.label: float(force.ravel() @ velocity)}
+        return {f"{self.label}_motion": float(force.sum(axis=0) @ self.term.shift(at.time)[1])}
 
     def observed(self, at: Arguments) -> dict[str, float]:
         """Area in contact, resultant on the tissue, largest pressure, smallest gap."""
         smallest = self.gap(at.time, at.state).distance.min()
-        near, gap, traction, *_ = self.traction(at)
+        near, gap, traction = self.traction(at)
         force = (self.weights[near] * traction) @ gap.normal
         names = (f"{self.label}_force_{axis}_N" for axis in "xyz")
         return {
@@ -191,19 +238,25 @@ class ContactSurface(Coupling):
         Means over the points, weighted with trilinear shape functions: their integral over the
         surface is the sum of all tractions times areas.
         """
-        near, _, traction, *_ = self.traction(at)
+        near, _, traction = self.traction(at)
         force = (self.weights[near] * traction) @ self._hats[near]
         area = self.weights @ self._hats
         return np.divide(force, area, out=np.zeros_like(area), where=area > 0)
 
 
-def _part(gap: Gap | None, reach: float = 0.0) -> tuple[IntArray, Gap]:
-    """Points nearer than a distance, and their gaps."""
-    if gap is None:
-        nothing = np.zeros((0, 3, 3))
-        return np.zeros(0, dtype=np.int64), Gap(nothing[:, 0, 0], nothing[:, 0], nothing)
-    near = np.flatnonzero(~(gap.distance >= reach))  # a NaN is to be noticed
-    return near, Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
+def _rows(points: IntArray) -> IntArray:
+    """Rows of the three components of points."""
+    return (3 * points[:, None] + [0, 1, 2]).ravel()
+
+
+def _spread(moves: Sparse, blocks: FloatArray, size: int) -> Sparse:
+    """Sum over points of N_K N_L times a block, as a matrix of mixed arrays."""
+    columns = np.repeat(np.arange(len(blocks) * 3).reshape(-1, 3), 3, axis=0)
+    starts = np.arange(0, blocks.size + 1, 3)
+    middle = sp.csr_array((blocks.ravel(), columns.ravel(), starts))
+    total = (moves.T @ (middle @ moves)).tocsr()
+    total.resize((size, size))
+    return total
 
 
 #: Of the triangle: corners, middles of edges, centre; exact to degree 3.
@@ -284,5 +337,9 @@ def _merged(
     trial = np.random.default_rng(0).random(moves.shape[1])
     key = (moves @ trial).reshape(-1, 3).round(9)
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    rows = (3 * first[:, None] + [0, 1, 2]).ravel()
-    return points[first], np.bincount(group.ravel(), weights), moves[rows], hats.tocsr()[first]
+    return (
+        points[first],
+        np.bincount(group.ravel(), weights),
+        moves[_rows(first)],
+        hats.tocsr()[first],
+    )
