@@ -145,20 +145,22 @@ class ContactSurface(Coupling):
         watched, near, gap, traction, *_ = self._touched(at)
         return watched.points[near], gap, traction
 
-    def _push(self, at: Arguments) -> tuple[Watched, FloatArray]:
-        """Return the forces on the points that are watched, N."""
-        watched, near, gap, traction, *_ = self._touched(at)
+    def _force(
+        self, watched: Watched, near: IntArray, gap: Gap, traction: FloatArray
+    ) -> FloatArray:
+        """Return the forces on the points that are watched, one component after the other, N."""
         force = np.zeros((watched.points.size, 3))
         force[near] = (self.weights[watched.points[near]] * traction)[:, None] * gap.normal
-        return watched, force
+        return force.ravel()
 
     # -- residual and tangent ------------------------------------------------------------------
 
     def add_residual(self, at: Arguments, out: FloatArray) -> None:
         """-int t n.w dA in rows of u, N."""
-        watched, force = self._push(at)
-        if force.any():
-            out[: self._size] -= watched.gathers @ force.ravel()
+        watched, near, gap, traction, *_ = self._touched(at)
+        if near.size:
+            force = self._force(watched, near, gap, traction)
+            out[: self._size] -= watched.gathers @ force
 
     def with_tangent(
         self, matrix: Sparse, at: Arguments, shifts: Shifts, rows: FloatArray
@@ -206,6 +208,8 @@ class ContactSurface(Coupling):
         if law.rated:
             return {}
         watched, near, gap = self._near(at.time, at.state)
+        if not near.size:
+            return {self.label: 0.0}
         weights = self.weights[watched.points[near]]
         return {self.label: float(weights @ law.energy(gap.distance))}
 
@@ -213,11 +217,12 @@ class ContactSurface(Coupling):
         """Power of a rated law, and of an obstacle that moves."""
         if not self.term.law.rated and self.term.motion is None:
             return {}
-        watched, force = self._push(at)
+        watched, near, gap, traction, *_ = self._touched(at)
+        force = self._force(watched, near, gap, traction)
         if self.term.law.rated:
-            velocity = watched.moves @ at.rate[: self._size]
-            return {self.label: float(force.ravel() @ velocity)}
-        return {f"{self.label}_motion": float(force.sum(axis=0) @ self.term.shift(at.time)[1])}
+            return {self.label: float(force @ (watched.moves @ at.rate[: self._size]))}
+        total = force.reshape(-1, 3).sum(axis=0)
+        return {f"{self.label}_motion": float(total @ self.term.shift(at.time)[1])}
 
     def observed(self, at: Arguments) -> dict[str, float]:
         """Area in contact, resultant on the tissue, largest pressure, smallest gap."""
