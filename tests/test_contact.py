@@ -378,7 +378,9 @@ def dropped(turn, law=DEFAULT):
     ("turn", "speed", "dt"),
     [
         ("flat", 0.1, 5e-3),
+        ("flat", 0.3, 5e-3),
         ("flat", 1.0, 1e-3),
+        ("edge", 0.3, 5e-3),
         ("edge", 1.0, 2e-3),
         ("corner", 0.1, 2e-3),
         ("corner", 1.0, 1e-3),
@@ -419,8 +421,42 @@ def test_impact(turn, speed, dt):
     kinetic = 0.5 * mass * speed**2
     assert np.diff(energies).max() <= 1e-12 * kinetic
     assert energies[-1] < energies[0] - 0.5 * kinetic
-    # the plain sum of impulses misses (af - 1/2) b of every change of dt (up to 3 % here)
-    assert np.abs(mean - [0, 0, -speed] - impulse).max() <= 5e-2 * speed
+    # the plain sum of impulses misses (af - 1/2) b of every change of dt (1 to 5 % here)
+    assert np.abs(mean - [0, 0, -speed] - impulse).max() <= 0.1 * speed
+
+
+def test_refusals():
+    """A point behind the obstacle; a touching point that leaps; not one that goes over a rim."""
+    system = System(Scene(BODY, (ReportTissue(), Contact(BELOW), Contact(Disc()))), True)
+    plane, disc = system.couplings
+    low, high, deep, aside = (
+        system.mixed(np.tile(way, (len(BODY.points), 1)))
+        for way in ([0, 0, -0.9e-3], [0, 0, -0.5e-3], [0, 0, -1.2e-3], [0.05, 0, -0.9e-3])
+    )
+    rest = 0 * low
+    assert plane.refusal(0.0, low, rest) == ""
+    assert plane.refusal(0.0, low) == ""
+    assert "penetration of 0.0002 m at contact_1" in plane.refusal(0.0, deep, low)
+    assert "penetration" in plane.refusal(0.0, deep)
+    assert plane.refusal(0.0, rest, rest) == ""
+    assert "leap" in plane.refusal(0.0, high, low)  # 1e-4 to 5e-4 m, range 2e-4 m
+    assert plane.refusal(0.0, high) == ""
+    assert "penetration" in disc.refusal(0.0, deep, low)
+    assert disc.refusal(0.0, aside, low) == "" and disc.refusal(0.0, low, aside) == ""
+    system.set_state(0.0, aside, rest, rest, aside)
+    assert disc.observed(system.arguments(0.0))["contact_2_gap_m"] == np.inf
+
+
+class Disc(Plane):
+    """BELOW, but nothing beyond 4 cm from the origin."""
+
+    def __init__(self):
+        super().__init__(BELOW.point)
+
+    def gap(self, points):
+        gap = super().gap(points)
+        beyond = np.linalg.norm(points[:, :2], axis=1) > 0.04
+        return replace(gap, distance=np.where(beyond, np.inf, gap.distance))
 
 
 def test_report_law_stops_a_drop_but_lets_it_creep():
