@@ -7,7 +7,6 @@ from typing import Any
 
 import meshio
 import numpy as np
-
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
