@@ -22,8 +22,8 @@ BY_VTK = (".obj", ".stl", ".vtp")
 def read_surface(path: Path | str, scale: float = 1.0, **options: Any) -> Triangulated:
     """Read a triangulated surface.
 
-    Points at the same place are merged (an STL file repeats them for every triangle), quadrilaterals
-    are cut into triangles; triangles that name a point twice after merging are left out.
+    Points at the same place are merged (an STL file repeats them for every triangle),
+    quadrilaterals are cut into triangles; triangles that lose a corner by merging are left out.
 
     Parameters
     ----------

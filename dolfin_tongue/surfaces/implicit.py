@@ -39,7 +39,7 @@ PROBES = np.array(
 
 
 def shape_operator(gradient: FloatArray, hessian: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Unit normal (k, 3) and shape operator (k, 3, 3), 1/m, of the level of a function."""
+    """Return unit normal (k, 3) and shape operator (k, 3, 3), 1/m, of the level of a function."""
     size = np.linalg.norm(gradient, axis=1)
     normal = gradient / size[:, None]
     tangent = np.eye(3) - normal[:, :, None] * normal[:, None, :]

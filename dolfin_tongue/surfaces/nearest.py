@@ -79,7 +79,7 @@ def tree_of(corners: FloatArray) -> Tree:
 
 
 def _bounds(count: int, level: int) -> IntArray:
-    """Ends of the runs on a level: 2^level of them, of equal length up to one."""
+    """Return the ends of the runs on a level: 2^level of them, of equal length up to one."""
     return np.arange(2**level + 1) * count // 2**level
 
 

@@ -125,8 +125,8 @@ def _smooth(distance: FloatArray, width: float) -> FloatArray:
 def _needed(
     tree: Tree, origin: FloatArray, blocks: IntArray, spacing: float, reach: float
 ) -> IntArray:
-    """Samples of all blocks that the band can touch, by the distance of the blocks' centres."""
-    index = np.moveaxis(np.indices(blocks), 0, -1).reshape(-1, 3)
+    """Mark the samples of all blocks that the band can touch, by the distance of the blocks' centres."""
+    index = np.moveaxis(np.indices(tuple(blocks)), 0, -1).reshape(-1, 3)
     centres = origin + spacing * (BLOCK * index + (BLOCK - 1) / 2)
     distance = np.linalg.norm(tree.nearest(centres)[2] - centres, axis=1)
     near = distance <= reach + np.sqrt(3.0) * spacing * (BLOCK - 1) / 2

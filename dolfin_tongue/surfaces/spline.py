@@ -63,7 +63,7 @@ def spline_through(
 
 @compiled
 def _fill(share, weights):
-    """The four cubic B-splines that are not zero at a place in a cell, and their derivatives."""
+    """Write the four cubic B-splines that are not zero at a place in a cell; two derivatives."""
     t, s = share, 1.0 - share
     weights[0, 0], weights[0, 3] = s * s * s / 6.0, t * t * t / 6.0
     weights[0, 1] = 2.0 / 3.0 - 0.5 * t * t * (2.0 - t)

@@ -123,7 +123,7 @@ def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
 
 
 def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Normals of triangles times their areas, shape (t, 3), m2."""
+    """Return the normals of triangles times their areas, shape (t, 3), m2."""
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     return 0.5 * np.cross(b - a, c - a)
 
@@ -135,7 +135,7 @@ def volume(points: FloatArray, triangles: IntArray) -> float:
 
 
 def feature_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Unit normals that tell the side of a point from its nearest point of the surface.
+    """Return unit normals that tell the side of a point from its nearest point of the surface.
 
     The normal at a corner is the mean of its triangles', weighted by their angles; the difference
     of point and nearest point has a positive product with it on the outer side: J. A. Baerentzen,

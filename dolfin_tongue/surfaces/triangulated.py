@@ -92,9 +92,7 @@ class Triangulated(Surface):
         object.__setattr__(self, "points", real_numbers(f"{name}: points", self.points))
         triangles = whole_numbers(f"{name}: triangles", self.triangles)
         object.__setattr__(self, "triangles", triangles)
-        remedy = (
-            "reverse them: triangles[:, ::-1]; if the inside is the free side, pass inside=True"
-        )
+        remedy = "reverse them: triangles[:, ::-1] (if the inside is free, also pass inside=True)"
         check_triangles(name, self.points, triangles, sheet=self.sheet, inside_out=remedy)
         self._choose_lengths()
         self._check_lengths()
