@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.errors import OutOfRange, require_positive
+from dolfin_tongue.errors import OutOfRange, TongueError, require_positive
 from dolfin_tongue.surfaces.base import Gap, Surface
 from dolfin_tongue.surfaces.differences import Function, first_derivatives, second_derivatives
 from dolfin_tongue.surfaces.simple import Vector
@@ -31,6 +31,9 @@ FOCUS = 1e-3
 
 #: Most steps to a nearest point, and the length of a step that ends them, over the distance.
 STEPS, CLOSE = 60, 1e-13
+
+#: What a function may be.
+KINDS = "a NumPy function of points (k, 3) with values (k,), or a UFL scalar of a UFL vector"
 
 #: Places where a function of a place is tried, m.
 PROBES = np.array(
@@ -88,7 +91,8 @@ class Ellipsoid(Surface):
         """Nearest points of the ellipsoid, shape (k, 3), m.
 
         They are p_i = a_i^2 y_i / (t + a_i^2) with the largest root t of sum (p_i / a_i)^2 = 1.
-        Newton's steps from below never pass that root, since the sum falls and is convex.
+        Newton's steps from below never pass that root, since the sum falls and is convex. The
+        unknown is t + min a_i^2, which loses no digits where it is small.
         """
         squared = np.asarray(self.semi_axes, dtype=float) ** 2
         arm = np.asarray(points, dtype=float) - self.centre
@@ -96,14 +100,16 @@ class Ellipsoid(Surface):
         least = 1e-12 * squared.max() ** 0.5
         arm = np.where(np.abs(arm) < least, np.copysign(least, arm), arm)
         scaled = np.sqrt(squared) * np.abs(arm)
-        t = (scaled - squared).max(axis=1)
+        beyond = squared - squared.min()
+        root = (scaled - beyond).max(axis=1)
         for _ in range(STEPS):
-            part = (scaled / (t[:, None] + squared)) ** 2
-            move = (part.sum(axis=1) - 1) / (2 * (part / (t[:, None] + squared)).sum(axis=1))
-            t = t + move
-            if np.abs(move).max(initial=0.0) < 1e-15 * squared.max():
+            size = root[:, None] + beyond
+            part = (scaled / size) ** 2
+            move = (part.sum(axis=1) - 1) / (2 * (part / size).sum(axis=1))
+            root = root + move
+            if (np.abs(move) <= 1e-15 * root).all():
                 break
-        return self.centre + squared * arm / (t[:, None] + squared)
+        return self.centre + squared * arm / (root[:, None] + beyond)
 
     def gap(self, points: FloatArray) -> Gap:
         """Signed distance with its derivatives."""
@@ -174,11 +180,22 @@ class Implicit(Surface):
         require_positive(self, "m", step=step)
         count = len(PROBES)
         with np.errstate(all="ignore"):  # not every place need be one where g is defined
-            _require_shape("function", self.value(PROBES), (count,))
+            _require_shape("function", self._tried(), (count,))
             slope = _require_shape("gradient", self.gradient(PROBES), (count, 3))
             _require_shape("hessian", self.hessian(PROBES), (count, 3, 3))
         if not slope[np.isfinite(slope)].any():
             raise OutOfRange("Implicit.function", "constant", "a function that varies")
+
+    def _tried(self) -> FloatArray:
+        """Values at a few places."""
+        try:
+            return self.value(PROBES)
+        except TongueError:
+            raise
+        except Exception as error:
+            raise OutOfRange(
+                "Implicit.function", self.function, f"{KINDS}; it raises {error!r}"
+            ) from error
 
     @cached_property
     def _formulas(self) -> tuple[Formula, list[Formula], list[list[Formula]]] | None:
@@ -192,8 +209,10 @@ class Implicit(Surface):
             expression = self.function(x)
         except Exception:  # whatever NumPy functions do when they meet a UFL vector
             return None
-        if not isinstance(expression, ufl.core.expr.Expr) or expression.ufl_shape:
+        if not isinstance(expression, ufl.core.expr.Expr):
             return None
+        if expression.ufl_shape:
+            raise OutOfRange("shape of Implicit.function in UFL", expression.ufl_shape, "()")
         first = ufl.diff(expression, x)
         second = ufl.diff(first, x)
         return (
@@ -259,18 +278,20 @@ class Implicit(Surface):
         near, active = self.project(points), np.arange(len(points))
         found = np.zeros(len(points), dtype=bool)
         for _ in range(STEPS):
-            move = self._step_to_nearest(points[active], near[active])
+            move, nearest = self._step_to_nearest(points[active], near[active])
             near[active] += move
             arm = np.linalg.norm(points[active] - near[active], axis=1)
             still = np.linalg.norm(move, axis=1) <= CLOSE * (1e-3 + arm)
-            found[active[still]] = True
+            found[active[still]] = nearest[still]
             active = active[~still & np.isfinite(move).all(axis=1)]
             if not len(active):
                 break
         return near, found
 
-    def _step_to_nearest(self, points: FloatArray, near: FloatArray) -> FloatArray:
-        """One of Newton's steps, shape (k, 3), m."""
+    def _step_to_nearest(
+        self, points: FloatArray, near: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """One of Newton's steps, shape (k, 3), m, and whether it leads to a nearest point."""
         gradient, hessian = self._slopes(near)
         normal, shape = shape_operator(gradient, hessian)
         arm = points - near
@@ -278,20 +299,19 @@ class Implicit(Surface):
         height = self.value(near) / np.linalg.norm(gradient, axis=1)
         bend, axes = np.linalg.eigh(np.nan_to_num(shape))
         stretch = 1 + distance[:, None] * bend
-        stretch = np.where(stretch > FOCUS, stretch, 1.0)
+        nearest = stretch > FOCUS
+        stretch = np.where(nearest, stretch, 1.0)
         along = arm - distance[:, None] * normal
         local = (axes.transpose(0, 2, 1) @ along[:, :, None])[:, :, 0] / stretch
         sideways = (axes @ local[:, :, None])[:, :, 0]
-        return sideways - height[:, None] * normal
+        return sideways - height[:, None] * normal, nearest.all(axis=1)
 
 
 def _require_shape(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """Return values if they have the shape and some are finite."""
     if values.shape != shape:
-        goal = "a NumPy function of points (k, 3), or a UFL scalar of a UFL vector"
-        raise OutOfRange(
-            f"shape of Implicit.{name} at {shape[0]} points", values.shape, f"{shape}: give {goal}"
-        )
+        what = f"shape of Implicit.{name} at {shape[0]} points"
+        raise OutOfRange(what, values.shape, f"{shape}; g is {KINDS}")
     if not np.isfinite(values).any():
         raise OutOfRange(f"Implicit.{name}", values, "finite numbers, at some places at least")
     return values

@@ -125,7 +125,7 @@ def _smooth(distance: FloatArray, width: float) -> FloatArray:
 def _needed(
     tree: Tree, origin: FloatArray, blocks: IntArray, spacing: float, reach: float
 ) -> IntArray:
-    """Mark the samples of all blocks that the band can touch, by the distance of the blocks' centres."""
+    """Mark the samples of all blocks whose centres are near enough to hold some of the band."""
     index = np.moveaxis(np.indices(tuple(blocks)), 0, -1).reshape(-1, 3)
     centres = origin + spacing * (BLOCK * index + (BLOCK - 1) / 2)
     distance = np.linalg.norm(tree.nearest(centres)[2] - centres, axis=1)
