@@ -38,7 +38,7 @@ TEETH_FADE = 8 * mm
 
 #: Where the alveolar ridge is highest, and how far it extends to both sides: parts of the way from
 #: the top of the vault to the gum line.
-RIDGE_PLACE, RIDGE_EXTENT = 0.75, 0.4
+RIDGE_PLACE, RIDGE_EXTENT = 0.65, 0.35
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,9 @@ def _by_vtk(path: Path) -> tuple[FloatArray, IntArray]:
     import pyvista
 
     try:
-        surface: Any = pyvista.read(path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            surface: Any = pyvista.read(path)
     except Exception as error:
         raise BadMesh(f"{path} cannot be read as a surface: {error}") from error
     if not isinstance(surface, pyvista.PolyData):

@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 
 from dolfin_tongue.arrays import FloatArray
 
-#: Least radius of a dent over its depth: the slope of its wall is at most 1.72 / 12 = 0.14.
+#: Least radius of a dent over its depth: its slope is at most 1.72 / 12 = 0.14.
 FLATNESS = 12.0
 
-#: Part of the largest depth that is added to all, since splines meet samples, not what is between.
+#: Part of the largest depth that is added to all, for what splines miss between samples.
 ROUNDING = 1e-3
 
 

@@ -32,11 +32,17 @@ if TYPE_CHECKING:  # compiled code is loaded when it is needed
 #: the curvature and a fifth of that of the normal, and costs half of what 0.5 edges do.
 EDGES = 0.7
 
+#: Most spacings of the default smoothing: larger triangles are meant to be flat.
+MOST_SMOOTHING = 2.5
+
 #: Limits of the default spacing, as parts of the extent.
 FINEST, COARSEST = 1 / 120, 1 / 60
 
 #: Default band, as part of the surface's size.
 BAND = 1 / 10
+
+#: Least radius of a dent, in spacings; most rounds of dents.
+LEAST_RADIUS, ROUNDS = 4.0, 8
 
 #: Least band, in spacings: fewer samples do not make a distance.
 LEAST_BAND = 2.0
@@ -65,7 +71,8 @@ class Triangulated(Surface):
     band : how far from the surface the distance is known, m, >= 2 spacings. Default: a tenth of
         the extent, or 2 spacings if that is more.
     smoothing : length over which the kinks between triangles are smoothed, m, >= 0, at most half
-        the band. Default: the spacing, or 0.7 median edges if that is less.
+        the band. Default: 0.7 median edges, but at most 2.5 spacings. Sharp edges are
+        rounded by as much; 0 keeps them, and the kinks.
     offset : thickness laid on the surface, m: the gap is the distance less this. A negative one
         moves the whole wall back.
     retraction : local dents of the wall; see `yielding`.
@@ -107,13 +114,14 @@ class Triangulated(Surface):
         spacing = cast(float, self.spacing)
         if self.band is None:
             object.__setattr__(self, "band", max(BAND * self.extent, LEAST_BAND * spacing))
+        require_positive(self, "m", band=self.band)
         if self.smoothing is None:
-            object.__setattr__(self, "smoothing", min(spacing, length))
+            width = min(length, MOST_SMOOTHING * spacing, cast(float, self.band) / 2)
+            object.__setattr__(self, "smoothing", width)
 
     def _check_lengths(self) -> None:
         """Refuse lengths that do not fit together."""
         name, least = type(self).__name__, LEAST_BAND * cast(float, self.spacing)
-        require_positive(self, "m", band=self.band)
         require_not_negative(self, "m", smoothing=self.smoothing)
         band, smoothing = cast(float, self.band), cast(float, self.smoothing)
         if band < least:
@@ -217,8 +225,8 @@ class Triangulated(Surface):
         ----------
         points : ndarray, shape (k, 3), m.
         clearance : least gap of the points, m.
-        radius : of a dent, m. Default: an eighth of the extent. It is at least 12 times the largest
-            lack, so that the wall stays flat.
+        radius : of a dent, m. Default: an eighth of the extent. It is enlarged to 4 spacings, so
+            that samples resolve it, and to 12 times the largest lack, so that the wall stays flat.
 
         Returns
         -------
@@ -235,8 +243,15 @@ class Triangulated(Surface):
         size = self.extent / 8 if radius is None else radius
         if not (is_number(size) and size > 0):
             raise OutOfRange("radius", radius, "a finite number > 0", "m")
-        dents = retraction_for(points, clearance - self.value(points), size)
-        return self._like(retraction=dents.joined(self.retraction))
+        size = max(float(size), LEAST_RADIUS * cast(float, self.spacing))
+        surface = self
+        for _ in range(ROUNDS):  # splines meet the dents at the samples, not between them
+            lacks = clearance - surface.value(points)
+            if lacks.max(initial=0.0) <= 0:
+                break
+            dents = retraction_for(points, lacks, size)
+            surface = surface._like(retraction=dents.joined(surface.retraction))
+        return surface
 
     @property
     def largest_retraction(self) -> float:

@@ -154,7 +154,9 @@ def test_numpy_and_ufl_operators_agree():
             + choose(less(x[0], 0.1), x[1] ** 2, lib.cosh(x[2]))
         )  # fmt: skip
 
-    from_ufl = Implicit(lambda x: written(ufl, x, ufl.max_value, ufl.conditional, ufl.lt), step=1e-3)
+    from_ufl = Implicit(
+        lambda x: written(ufl, x, ufl.max_value, ufl.conditional, ufl.lt), step=1e-3
+    )
     from_numpy = Implicit(lambda x: written(np, x.T, np.maximum, np.where, np.less), step=1e-3)
     points = np.random.default_rng(2).uniform(-1.0, 1.0, (50, 3))
     # away from the kinks of max, abs and the condition, which differences would straddle
