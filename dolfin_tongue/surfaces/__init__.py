@@ -1,6 +1,7 @@
 """Rigid surfaces to slide on or to touch."""
 
 from dolfin_tongue.surfaces.base import Gap, Surface
+from dolfin_tongue.surfaces.files import read_surface
 from dolfin_tongue.surfaces.implicit import Ellipsoid, Implicit
 from dolfin_tongue.surfaces.overlap import overlap
 from dolfin_tongue.surfaces.simple import Cylinder, Plane, Sphere
@@ -16,4 +17,5 @@ __all__ = [
     "Surface",
     "Triangulated",
     "overlap",
+    "read_surface",
 ]

@@ -6,7 +6,6 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-import meshio
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -68,6 +67,8 @@ def _by_vtk(path: Path) -> tuple[FloatArray, IntArray]:
 
 def _by_meshio(path: Path) -> tuple[FloatArray, IntArray]:
     """Points and triangles by meshio."""
+    import meshio
+
     try:
         mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio leaves the program on some damaged files

@@ -4,9 +4,15 @@ The distance to the triangles is sampled once on a regular grid, and the samples
 tricubic B-splines. Gap, normal and curvature are the value and the derivatives of that one C2
 function, so that contact forces derive from an energy and have a symmetric stiffness. They are
 those of the smooth surface where the function is zero, which is off the triangles by
-`Triangulated.smoothing_error`; the length of the normal differs from 1 by as little.
+`Triangulated.smoothing_error`. The normal is the gradient as it is: its length is 1 to within that
+error over the spacing.
 
-TODO
+Cost, for the palate of `geometry.palate` on one core, compiled code being there: with 1e3, 1e4 and
+1e5 triangles the samples take 0.5, 2 and 5 s (3 to 9 MB), gap, normal and curvature always 0.1 us
+per point. Accuracy, on a sphere of radius R = 30 mm with edges of 2.2 mm and default options: gap
+to 0.024 mm (its triangles are as far from it), normal to 0.002, curvature to 0.04 / R at worst and
+0.002 / R typically; without smoothing the last two are 0.016 and 0.6 / R, and finer triangles do
+not lower the 0.6.
 """
 
 from __future__ import annotations
@@ -54,9 +60,11 @@ class Triangulated(Surface):
 
     The distance is inf, with normal and curvature zero, further from the surface than `band` on
     either side, and where the nearest point of a sheet lies on its rim: there is no contact
-    there. So a body that passes the rim, or gets deeper than the band, is free: choose a sheet
-    wider than the body's way, and a band deeper than any overlap. Parts of a sheet nearer to each
-    other than twice the band get a kink half way between them, and so does a thin wall.
+    there. So a body that passes the rim, or gets deeper than the band, is free, and one that comes
+    up behind the rim is all at once deep in the wall: choose a sheet wider than the body's way, and
+    a band deeper than any overlap. Parts of a sheet nearer to each other than twice the band get a
+    rounded kink half way between them, and so does a thin wall. That no triangles intersect is not
+    checked.
 
     Parameters
     ----------
@@ -202,7 +210,7 @@ class Triangulated(Surface):
     def smoothing_error(self) -> float:
         """Largest distance of corners and centres of the triangles from the smooth surface, m.
 
-        Sharp edges are rounded by about a fifth of the spacing; offset and retraction do not count.
+        Sharp edges are rounded by about half of `smoothing`. Offset and retraction do not count.
         """
         bare = self._like(offset=0.0, retraction=None)
         centres = self.points[self.triangles].mean(axis=1)
