@@ -76,6 +76,22 @@ def test_the_side_is_right_at_a_sharp_fold():
     assert ((distance > 0) == above).all()
 
 
+def test_the_side_is_right_at_a_tip_of_many_triangles():
+    """A sharp pyramid, one side of it cut into fifty: they must not outvote the two others."""
+    corners = np.array([[0.15, 0.0, -1.0], [-0.075, 0.13, -1.0], [-0.075, -0.13, -1.0]])
+    share = np.linspace(0.0, 1.0, 51)[:, None]
+    points = np.concatenate([np.zeros((1, 3)), (1 - share) * corners[0] + share * corners[1]])
+    points = np.concatenate([points, corners[2:]])
+    fan = np.stack([np.zeros(50, int), np.arange(1, 51), np.arange(2, 52)], axis=1)
+    triangles = np.concatenate([fan, [[0, 51, 52], [0, 52, 1]]])
+    places = RANDOM.normal(size=(2000, 3)) * 0.1
+    normals = np.cross(corners, np.roll(corners, -1, axis=0))
+    outside = (places @ normals.T).max(axis=1) > 0
+    distance, inner = exact(points, triangles, places)
+    assert inner.all()
+    assert ((distance > 0) == outside).all()
+
+
 def test_beyond_a_rim_there_is_no_side():
     places = np.array([[0.0, 0.0, 0.002], [0.021, 0.0, 0.002], [0.021, 0.021, -0.002]])
     distance, inner = exact(*sheet(), places)
