@@ -54,7 +54,7 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
 def _landmark_paths(folder: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return times (s) and positions, shape (k, 3), mm, of each landmark."""
     columns = read_table(folder / "trajectories.csv")
-    names = [name[: -len("_x_m")] for name in columns if name.endswith("_x_m")]
+    names = [name[: -len("_y_m")] for name in columns if name.endswith("_y_m")]  # no bones: no y
     return {
         name: (
             columns["time_s"],
