@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.bones import hyoid, mandible
 from dolfin_tongue.boundary import Attached, Contact, Gravity
@@ -18,7 +19,7 @@ from dolfin_tongue.geometry.palate import report_palate
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
 from dolfin_tongue.scene import Scene
-from dolfin_tongue.surfaces import read_surface
+from dolfin_tongue.surfaces import facing, read_surface
 from dolfin_tongue.term import Support
 
 #: Viscosity of the tongues, Pa s: the stiffness damping of the published tongue (0.03 s) times its
@@ -33,6 +34,10 @@ SURROUNDINGS = ("palate", "mandible", "hyoid")
 
 #: Distance that the published palate leaves to its tongue at rest, which it overlaps, m.
 CLEARANCE = 3e-4
+
+#: Distance within which the published tongue faces its palate at rest, and how far they overlap
+#: at most, m.
+FACING, OVERLAP = 0.01, 1e-3
 
 
 def report_tongue(
@@ -117,13 +122,16 @@ def published_mouth(
     activation, parts, motion, geniohyoid : as in `report_mouth`.
     """
     scene = published_scene(folder, activation)
-
-    def contact() -> Contact:
-        palate = read_surface(folder / "palate.obj", sheet=True)
-        return Contact(palate.yielding(surface_samples(scene.body), CLEARANCE))
-
+    if "palate" in parts:
+        body, palate = scene.body, read_surface(folder / "palate.obj", sheet=True)
+        faces = facing(body, palate, FACING, OVERLAP)
+        palate = palate.yielding(face_samples(body, faces), CLEARANCE)
+        body = replace(body, surfaces={**body.surfaces, "palatal": faces})
+        scene = replace(scene, body=body)
     carried = {"mandible": "jaw", "hyoid": "hyoid"}
-    return _in_mouth(scene, parts, carried, (), motion, geniohyoid, contact)
+    return _in_mouth(
+        scene, parts, carried, (), motion, geniohyoid, lambda: Contact(palate, "palatal")
+    )  # fmt: skip
 
 
 def _in_mouth(
@@ -150,10 +158,10 @@ def _in_mouth(
     return Scene(scene.body, terms, tuple(supports))
 
 
-def surface_samples(body: Body) -> FloatArray:
-    """Nodes and quadrature points of the whole surface of a body at rest, shape (k, 3), m."""
-    corners = body.points[body.boundary]
+def face_samples(body: Body, faces: IntArray) -> FloatArray:
+    """Nodes and quadrature points of outer faces of a body at rest, shape (k, 3), m."""
+    corners = body.points[faces]
     a, b = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
-    weights = np.array([[a * a, a * b, b * b, a * b]])
-    inner = [np.einsum("k,fkc->fc", np.roll(weights[0], i), corners) for i in range(4)]
-    return np.concatenate([body.points[np.unique(body.boundary)], *inner])
+    weights = np.array([a * a, a * b, b * b, a * b])
+    inner = [np.einsum("k,fkc->fc", np.roll(weights, i), corners) for i in range(4)]
+    return np.concatenate([body.points[np.unique(faces)], *inner])

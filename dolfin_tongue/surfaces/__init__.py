@@ -1,6 +1,7 @@
 """Rigid surfaces to slide on or to touch."""
 
 from dolfin_tongue.surfaces.base import Gap, Surface
+from dolfin_tongue.surfaces.facing import facing
 from dolfin_tongue.surfaces.files import read_surface
 from dolfin_tongue.surfaces.implicit import Ellipsoid, Implicit
 from dolfin_tongue.surfaces.overlap import overlap
@@ -16,6 +17,7 @@ __all__ = [
     "Sphere",
     "Surface",
     "Triangulated",
+    "facing",
     "overlap",
     "read_surface",
 ]
