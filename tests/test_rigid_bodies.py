@@ -8,6 +8,7 @@ from math import radians
 import numpy as np
 import pytest
 
+from benchmarks.extremes.proofs import hinged_bone
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
 from dolfin_tongue.control import Constant, Ramp, Recorded, SmoothMove, Still, Swing
@@ -203,20 +204,12 @@ def test_bone_feels_what_it_exerts():
     )
 
 
-def pendulum() -> Scene:
-    """A bone on a hinge that carries a soft block."""
-    bone = carrier(
-        centre=(-0.005, 0.01, 0.03), pivot=(-0.01, 0.01, 0.06), motion={"x": Still(), "z": Still()}
-    )
-    return Scene(BLOCK, (MooneyRivlin(3e3, 0.0), Viscosity(20.0), Gravity()), (bone,))
-
-
 def test_pendulum_with_a_soft_block_is_of_order_two():
     pytest.importorskip("dolfinx")
     from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
 
     def last(dt: float) -> np.ndarray:
-        for state in Dynamics(pendulum(), TimeSteps(dt)).march(0.08):
+        for state in Dynamics(hinged_bone(), TimeSteps(dt)).march(0.08):
             end = state
         return np.append(end.displacement[-1], end.rigid[0, 2] * 0.05)
 
