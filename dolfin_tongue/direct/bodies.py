@@ -156,10 +156,6 @@ class Bodies:
         pick = np.ix_(self.unknown, self.unknown)
         return -by_q[pick], -by_v[pick]
 
-    def owner(self, point: int) -> RigidBody:
-        """Body of a point, by its place in `rows`."""
-        return next(body for body, part, _ in self._each() if point < part.stop)
-
     # -- balances ------------------------------------------------------------------------------
 
     def energy(self, rigid: FloatArray, rate: FloatArray) -> float:

@@ -112,7 +112,7 @@ def condensed(
         model.blocks, model.block_dofs, matrices, model.near_bodies, strict=False
     ):
         P, Q = (
-            field[block.cells[near]].transpose(0, 2, 1, 3).reshape(len(near), -1, count)
+            field[block.cells[near]].transpose(0, 2, 1, 3).reshape(len(near), part.shape[1], count)
             for field in fields
         )
         A = part[near]

@@ -17,9 +17,9 @@ would not. What the volumes drift in a step, O(h^3), is then taken out of U with
 Sliding nodes are constraints like the volumes, in all of this. A rigid body (`bodies`) adds its
 unknown coordinates q: U and V of its points follow from q and q', and the stage asks for the
 balance of the body with the inertia of its points as everywhere, M (V - V_k)/(d h) with V = T q' at
-the end of the stage. So all momentum that leaves a node arrives at another one, and a free body keeps its
-linear momentum to round-off, turning or not. Newton's matrix gets a border with the T of the points
-and its turning (`border`). The drift of the constraints is taken out of the nodes alone.
+the end of the stage. So all momentum that leaves a node arrives at another one, and a free body
+keeps its linear momentum to round-off, turning or not. Newton's matrix gets a border with the T of
+the points and its turning (`border`). The drift of the constraints is taken out of the nodes alone.
 
 Two ways to use it:
 - Newton to a tolerance, with the factors kept over iterations and steps while they serve;

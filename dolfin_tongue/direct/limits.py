@@ -7,8 +7,9 @@ adds the double eigenvalue -1/tau. Runge-Kutta 4 is stable where |s| dt <= 2.61 
 half-plane (2.785 on the real axis), so that dt is refused beyond 2.61 / max(|s|, 1/tau).
 
 The radii come from power iterations; each term has its own, which tells the cause. The unknown
-coordinates of rigid bodies take part, with their springs and dampers as one more term: a light body
-on stiff tissue or springs has fast modes. Sliding nodes stay on their surfaces, as volumes are kept.
+coordinates of rigid bodies take part, with their springs and dampers as one more term, which sets
+the limit of a light body. Tissue on a body, however light, is not faster than without it: rigid
+motion of its nodes and more mass both lower Rayleigh's quotient. Sliding nodes stay on surfaces.
 """
 
 from __future__ import annotations
@@ -86,23 +87,19 @@ class StabilityLimits:
         if not bounds or bounds[worst] < 0.3 * rate:
             return f"the pressures of the volume constraint (fastest rate {rate:.3g} 1/s)"
         term, (c, w) = terms[worst], parts[worst]
-        moved = self._moved(self._vectors[worst, "damping" if c > w else "stiffness"])
-        if term is None:
-            return f"springs and dampers of {moved} (fastest rate {rate:.3g} 1/s)"
-        return _describe(term, c, w, rate) + (
-            f" that moves the rigid body {moved}" if moved else ""
-        )
+        if term is not None:
+            return _describe(term, c, w, rate)
+        name = self._moved(self._vectors[worst, "damping" if c > w else "stiffness"])
+        return f"springs and dampers of {name} (fastest rate {rate:.3g} 1/s)"
 
     def _moved(self, vector: FloatArray) -> str:
-        """Rigid body whose points move fastest of all in a mode; empty where free nodes do."""
-        bodies, columns = self.model.bodies, self.acceleration.columns
-        if bodies is None or columns is None:
-            return ""
-        free = 3 * len(self.model.free)
-        speed = np.linalg.norm(columns @ vector[free:], axis=1)
-        if speed.max() < 0.999 * np.abs(vector[:free]).max(initial=0.0):
-            return ""
-        return bodies.owner(int(speed.argmax())).name
+        """Name of the rigid body with most of the kinetic energy of a mode."""
+        bodies = self.model.bodies
+        assert bodies is not None
+        energy = np.zeros(bodies.given.size)
+        own = np.diag(bodies.loads.mass(np.zeros(len(energy))))[bodies.unknown]
+        energy[bodies.unknown] = own * vector[3 * len(self.model.free) :] ** 2
+        return bodies.bodies[int(energy.reshape(-1, 3).sum(axis=1).argmax())].name
 
     def _radii(
         self,
