@@ -149,7 +149,7 @@ def stage(solver: Direct, u, v, step: float, time: float):
     return point, residual
 
 
-@pytest.mark.parametrize(("turning", "bound"), [(0.0, 1e-6), (1.0, 1e-2)], ids=["still", "turning"])
+@pytest.mark.parametrize(("turning", "bound"), [(0.0, 1e-8), (1.0, 1e-4)], ids=["still", "turning"])
 def test_newton_s_matrix_is_the_derivative_of_the_stage(turning, bound):
     """Border, Hessians of g, springs, arms that turn: exact but for stiffness times turning."""
     solver, step, time = Direct(two_bodies(), Implicit()), 1e-3, 0.013
@@ -177,7 +177,8 @@ def test_newton_s_matrix_is_the_derivative_of_the_stage(turning, bound):
         assert relative(again, dv) <= relative(velocity, dv) / 8  # second order: 16
 
 
-def test_full_newton_is_quadratic_with_bodies_and_slides():
+def test_full_newton_converges_fast_with_bodies_and_slides():
+    """Linearly, by the strain and rotation of a step: what Newton's matrix leaves out."""
     solver = Direct(two_bodies(), Implicit(4e-3, newton=1e-13, patience=0))
     sizes: list[float] = []
     correct = solver.stepper._correct
@@ -187,9 +188,12 @@ def test_full_newton_is_quadratic_with_bodies_and_slides():
         return sizes[-1]
 
     solver.stepper._correct = recorded
-    *_, last = solver.march(0.02)
-    assert last.iterations <= 10  # of two stages
-    assert solver.stepper.evaluations == len(sizes)
+    list(solver.march(0.02))
+    ratios = np.array(sizes[1:]) / sizes[:-1]
+    within = np.array(sizes[:-1]) > 1e-13  # not the last one of its stage
+    assert within.sum() >= 30
+    # The first step, of 4 ms from rest without activation ramp, turns by 0.02.
+    assert ratios[within].max() <= 0.1
 
 
 def test_the_implicit_stage_balances_the_bodies_at_its_tolerance():
@@ -234,19 +238,18 @@ def flight(method) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_free_body_with_a_block_keeps_its_momentum():
-    linear, angular = flight(Implicit(2e-3, newton=1e-13))
-    # Newton leaves a force, not momentum: 1e-13 m / (d h) on 25 g in each of 60 stages.
-    left = 60 * 1e-13 / 0.58e-3 * 0.025
-    assert np.abs(linear - linear[0]).max() <= left <= 1e-6 * np.abs(linear[0]).max()
+    linear, angular = flight(Implicit(2e-3, newton=1e-14, patience=0))
+    assert np.abs(linear - linear[0]).max() <= 1e-12 * np.abs(linear[0]).max()
     _, finer = flight(Implicit(1e-3, newton=1e-12))
     coarse, fine = (np.abs(part - part[0]).max() / abs(part[0]) for part in (angular, finer))
-    assert fine <= 1e-3
+    assert fine <= 5e-5
     assert 3.2 <= coarse / fine <= 9
     linear, angular = flight(RungeKutta4(2e-4))
     finer, _ = flight(RungeKutta4(1e-4))
     coarse, fine = (np.abs(part - part[0]).max() for part in (linear, finer))
-    assert fine <= 1e-7 * np.abs(linear[0]).max()
-    assert coarse / fine >= 10
+    # The coordinates, not the momentum, are what Runge-Kutta adds up: kept to its order.
+    assert fine <= 1e-12 * np.abs(linear[0]).max()
+    assert coarse / fine >= 8
 
 
 def test_energy_of_an_elastic_pendulum_is_kept():
@@ -256,7 +259,7 @@ def test_energy_of_an_elastic_pendulum_is_kept():
         solver.model.energy(s.displacement, s.velocity, s.rigid, s.rigid_rate)
         for s in solver.march(END)
     ]
-    assert np.ptp(energies) <= 1e-7 * 0.02 * 9.81 * 0.02
+    assert np.ptp(energies) <= 1e-10 * 0.02 * 9.81 * 0.02
 
 
 # -- orders --------------------------------------------------------------------------------------
