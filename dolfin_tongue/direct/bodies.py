@@ -18,7 +18,6 @@ point there. Prescribed coordinates have no equation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -50,18 +49,21 @@ class Bodies:
         self.bodies, self.loads = tuple(bodies), Loads(bodies, gravity)
         self.attached = np.concatenate([*attached, []]).astype(np.int64)
         rows = [np.append(nodes, count + i) for i, nodes in enumerate(attached)]
-        ends = np.cumsum([0, *map(len, rows)])
-        self._parts = [slice(a, b) for a, b in pairwise(ends)]
+        self._owner = np.repeat(np.arange(number), [len(part) for part in rows])
         #: Rows of the points of all bodies, body after body, each with its centre last.
         self.rows = np.concatenate(rows).astype(np.int64)
         self.is_centre = self.rows >= count
         self.centres = slice(count, count + number)
         self.coordinates = slice(count + number, count + 2 * number)
-        self._arms = [
+        own = [
             body.arms(np.concatenate([points[nodes], np.asarray(body.centre)[None]]))
             for body, nodes in zip(bodies, attached, strict=True)
         ]
+        self._arms = np.concatenate(own)
+        self._key = b""
+        self._known: tuple[FloatArray, FloatArray, FloatArray]
         self.given = np.array([body.given for body in bodies])
+        self._any_given = bool(self.given.any())
         #: Places of the unknown coordinates among all 3 b.
         self.unknown = np.flatnonzero(~self.given)
         #: Moment of inertia at the angles, 0 at the other coordinates, shape (3b,), kg m2.
@@ -71,28 +73,51 @@ class Bodies:
 
     # -- kinematics ----------------------------------------------------------------------------
 
+    def _turned(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Arms (k, 3), T over all coordinates (3k, 3b), and d2u/dangle2 (k, 3), at given angles."""
+        angles = u[self.coordinates, 2]
+        key = angles.tobytes()
+        if key != self._key:
+            c, s = np.cos(angles)[self._owner], np.sin(angles)[self._owner]
+            arms = self._arms.copy()
+            arms[:, 0] = c * self._arms[:, 0] + s * self._arms[:, 2]
+            arms[:, 2] = c * self._arms[:, 2] - s * self._arms[:, 0]
+            count, first = np.arange(len(arms)), 3 * self._owner
+            T = np.zeros((len(arms), 3, self.given.size))
+            T[count, 0, first] = T[count, 2, first + 1] = 1.0
+            T[count, 0, first + 2], T[count, 2, first + 2] = arms[:, 2], -arms[:, 0]
+            self._key = key
+            self._known = arms, T.reshape(3 * len(arms), -1), arms * [-1.0, 0.0, -1.0]
+        return self._known
+
     def place(self, time: float, u: FloatArray, v: FloatArray | None = None) -> None:
         """Write prescribed coordinates, and displacement and velocity of all points."""
-        q = u[self.coordinates]
-        rate = None if v is None else v[self.coordinates]
-        for i, (body, part, arms) in enumerate(self._each()):
-            if self.given[i].any():
-                value = body.prescribed(time)
-                q[i, self.given[i]] = value[0, self.given[i]]
-                if rate is not None:
-                    rate[i, self.given[i]] = value[1, self.given[i]]
-            u[self.rows[part]] = plane.displacement(arms, q[i])
-            if v is not None and rate is not None:
-                v[self.rows[part]] = plane.jacobian(arms, q[i]) @ rate[i]
+        q, rate = u[self.coordinates], None if v is None else v[self.coordinates]
+        if self._any_given:
+            value = np.array([body.prescribed(time) for body in self.bodies])
+            q[self.given] = value[:, 0][self.given]
+            if rate is not None:
+                rate[self.given] = value[:, 1][self.given]
+        arms, T, _ = self._turned(u)
+        moved = arms - self._arms
+        moved[:, 0] += q[self._owner, 0]
+        moved[:, 2] += q[self._owner, 1]
+        u[self.rows] = moved
+        if v is not None and rate is not None:
+            v[self.rows] = (T @ rate.ravel()).reshape(-1, 3)
 
-    def given_acceleration(self, time: float, u: FloatArray, v: FloatArray, out: FloatArray):
+    def given_acceleration(
+        self, time: float, u: FloatArray, v: FloatArray, out: FloatArray
+    ) -> None:
         """Write the accelerations that are left when the unknown ones are zero."""
-        q, rate = u[self.coordinates], v[self.coordinates]
-        for i, (body, part, arms) in enumerate(self._each()):
-            second = body.prescribed(time)[2]
-            out[self.coordinates][i] = second
-            turn = plane.bend(arms, q[i]) * rate[i, 2] ** 2
-            out[self.rows[part]] = plane.jacobian(arms, q[i]) @ second + turn
+        _, T, bend = self._turned(u)
+        turn = v[self.coordinates, 2] ** 2
+        acceleration = bend * turn[self._owner][:, None]
+        if self._any_given:
+            second = np.array([body.prescribed(time)[2] for body in self.bodies])
+            out[self.coordinates] = second
+            acceleration += (T @ second.ravel()).reshape(-1, 3)
+        out[self.rows] = acceleration
 
     def columns(self, u: FloatArray, turn: FloatArray | None = None) -> FloatArray:
         """Velocity of the points by the rates of the unknown coordinates, shape (k, 3, r).
@@ -103,21 +128,17 @@ class Bodies:
         turn : angle that each body turns by while its rate is varied, shape (b,), rad: the rate in
             a stage changes the position too, by d h, so that T turns by d h angle'. Default none.
         """
-        q = u[self.coordinates]
-        full = np.zeros((len(self.rows), 3, 3 * len(self.bodies)))
-        for i, (_, part, arms) in enumerate(self._each()):
-            full[part, :, 3 * i : 3 * i + 3] = plane.jacobian(arms, q[i])
-            if turn is not None:
-                full[part, :, 3 * i + 2] += turn[i] * plane.bend(arms, q[i])
-        return full[:, :, self.unknown]
+        _, T, bend = self._turned(u)
+        T = T.reshape(len(bend), 3, -1)
+        if turn is not None:
+            T = T.copy()
+            points = np.arange(len(bend))
+            T[points, :, 3 * self._owner + 2] += turn[self._owner][:, None] * bend
+        return T[:, :, self.unknown]
 
     def forces(self, u: FloatArray, force: FloatArray) -> FloatArray:
         """sum_k T_k^T f_k on all coordinates, shape (b, 3), from forces on all rows."""
-        q, out = u[self.coordinates], np.empty((len(self.bodies), 3))
-        for i, (_, part, arms) in enumerate(self._each()):
-            T = plane.jacobian(arms, q[i])
-            out[i] = np.einsum("kij,ki->j", T, force[self.rows[part]])
-        return out
+        return (force[self.rows].ravel() @ self._turned(u)[1]).reshape(-1, 3)
 
     # -- equations -----------------------------------------------------------------------------
 
@@ -149,10 +170,9 @@ class Bodies:
         """
         at = self.coordinates
         _, by_q, by_v = self.loads.force_and_tangents(time, u[at].ravel(), v[at].ravel())
-        for i, (_, part, arms) in enumerate(self._each()):
-            by_q[3 * i + 2, 3 * i + 2] += np.sum(
-                plane.bend(arms, u[at][i]) * force[self.rows[part]]
-            )
+        bent = np.sum(self._turned(u)[2] * force[self.rows], axis=1)
+        angles = 3 * np.arange(len(self.bodies)) + 2
+        by_q[angles, angles] += np.bincount(self._owner, bent)
         pick = np.ix_(self.unknown, self.unknown)
         return -by_q[pick], -by_v[pick]
 
@@ -161,20 +181,19 @@ class Bodies:
     def energy(self, rigid: FloatArray, rate: FloatArray) -> float:
         """Kinetic energy and energy of the weights, J."""
         total = self.loads.kinetic_energy(rigid.ravel(), rate.ravel())
-        for i, (body, _, arms) in enumerate(self._each()):
-            total -= body.mass * float(plane.displacement(arms[-1:], rigid[i])[0] @ self._gravity)
+        for body, q in zip(self.bodies, rigid, strict=True):
+            arm = body.arms(np.asarray(body.centre))
+            total -= body.mass * float(plane.displacement(arm, q)[0] @ self._gravity)
         return total
 
     def momentum(self, rigid: FloatArray, rate: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Momentum, N s, and angular momentum about the origin, N m s; each of shape (3,)."""
         linear, angular = np.zeros((2, 3))
-        for i, (body, _, arms) in enumerate(self._each()):
-            place = np.asarray(body.centre) + plane.displacement(arms[-1:], rigid[i])[0]
-            own = body.mass * plane.jacobian(arms[-1:], rigid[i])[0] @ rate[i]
+        for body, q, v in zip(self.bodies, rigid, rate, strict=True):
+            arm = body.arms(np.asarray(body.centre))
+            place = np.asarray(body.centre) + plane.displacement(arm, q)[0]
+            own = body.mass * plane.jacobian(arm, q)[0] @ v
             linear += own
             angular += np.cross(place, own)
-            angular[1] += body.inertia * rate[i, 2]
+            angular[1] += body.inertia * v[2]
         return linear, angular
-
-    def _each(self) -> list[tuple[RigidBody, slice, FloatArray]]:
-        return list(zip(self.bodies, self._parts, self._arms, strict=True))

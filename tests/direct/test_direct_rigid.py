@@ -10,7 +10,15 @@ from dolfin_tongue.boundary import Attached, Gravity, Sliding
 from dolfin_tongue.constitutive import ActiveMuscles, MooneyRivlin, ReportTissue, Viscosity
 from dolfin_tongue.control import Constant, SmoothRamp
 from dolfin_tongue.control.motion import SmoothMove, Still, Swing
-from dolfin_tongue.direct import Adaptive, Direct, Implicit, RungeKutta4, momentum, multipliers
+from dolfin_tongue.direct import (
+    Adaptive,
+    Direct,
+    Implicit,
+    RungeKutta4,
+    momentum,
+    multipliers,
+    saddle,
+)
 from dolfin_tongue.direct.implicit import Motion
 from dolfin_tongue.direct.limits import StabilityLimits
 from dolfin_tongue.direct.multipliers import Acceleration
@@ -218,6 +226,23 @@ def test_the_implicit_stage_balances_the_bodies_at_its_tolerance():
     # A velocity of newton / (d h) is left, which M / (d h) turns into a force.
     left = 1e-12 / (0.29e-3) ** 2 * (0.02 + scene.body.mass)
     assert np.abs(inertia - load - received)[free].max() <= left <= 1e-5 * np.abs(load).max()
+
+
+def test_sparse_systems_and_adapted_steps_give_the_same_motion(monkeypatch):
+    usual = final(two_bodies(), Implicit(1e-3, newton=1e-12))
+    with monkeypatch.context() as patch:
+        patch.setattr(saddle, "DENSE_SIZE", 0)
+        sparse = final(two_bodies(), Implicit(1e-3, newton=1e-12))
+    for name in ("displacement", "velocity", "rigid", "rigid_rate", "pressure", "sliding"):
+        assert relative(getattr(sparse, name), getattr(usual, name)) <= 1e-7
+    tight = final(two_bodies(), Adaptive(1e-10))
+    solver = Direct(two_bodies(), Implicit(2e-4, tolerance=1e-6, newton=1e-10))
+    states = list(solver.march(END))
+    steps = np.array([state.step for state in states[1:]])
+    assert steps.max() > 1.5 * steps.min()
+    assert np.abs(states[-1].displacement - tight.displacement).max() <= len(steps) * 1e-6
+    assert relative(usual.displacement, tight.displacement) <= 1e-3
+    assert relative(usual.rigid, tight.rigid) <= 1e-3
 
 
 # -- balances of a motion ------------------------------------------------------------------------
