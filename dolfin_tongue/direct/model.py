@@ -314,7 +314,8 @@ class Model:
 
         Parameters
         ----------
-        state : with `rigid`, of which displacement and velocity of attached nodes are taken.
+        state : displacement and velocity of attached nodes are those that its `rigid` and
+            `rigid_rate` give, prescribed coordinates those of its time.
         acceleration : of all nodes, shape (n, 3), m/s2; None leaves inertia out.
         """
         if self.bodies is None:

@@ -200,6 +200,7 @@ def test_the_surface_acts_along_its_normal_and_carries_the_block():
     normal = BOWL.gradient(model.mesh.points[nodes] + u[nodes])
     assert np.abs(np.cross(rest[nodes], normal)).max() <= 1e-9 * scale
     told = model.state(0.0, u, v, pressure).sliding
+    np.testing.assert_allclose(model.multipliers(model.state(0.0, u, v, pressure)), pressure)
     np.testing.assert_allclose(np.sum(rest[nodes] * normal, axis=1), told, atol=1e-9 * scale)
     # All in all it carries weight and centripetal force of a physical pendulum; a stiff block that
     # was let go vibrates by about its weight, so that only the mean over the motion is sharp.
