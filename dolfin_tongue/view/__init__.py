@@ -10,10 +10,12 @@ from dolfin_tongue.view.fibres import fibre_pictures
 from dolfin_tongue.view.picture import shape_picture
 from dolfin_tongue.view.plots import energy_plot, trajectories
 from dolfin_tongue.view.sheet import contact_sheet, final_shapes, telling_frames
+from dolfin_tongue.view.surroundings import Surroundings
 
 __all__ = [
     "OBLIQUE",
     "SIDE",
+    "Surroundings",
     "View",
     "animation",
     "contact_sheet",

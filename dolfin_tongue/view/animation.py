@@ -22,6 +22,7 @@ from dolfin_tongue.view.canvas import (
     milliseconds,
 )
 from dolfin_tongue.view.film import Film
+from dolfin_tongue.view.surroundings import Surroundings
 
 #: Width of the animation, pixels.
 WIDTH = 480
@@ -37,6 +38,7 @@ def animation(
     *,
     fixed: Sequence[str] = (),
     outline: bool = True,
+    surroundings: Surroundings | None = None,
 ) -> Path:
     """Write a GIF of a movement, seen as in `contact_sheet`, which repeats for ever.
 
@@ -48,6 +50,7 @@ def animation(
     fps : frames per second, in (0, 50]. The format rounds a frame's duration to 10 ms.
     fixed : regions whose nodes are marked.
     outline : whether the outline of the body at rest is drawn, faintly.
+    surroundings : walls and bones; see `Surroundings.of`.
 
     Returns
     -------
@@ -61,7 +64,7 @@ def animation(
     """
     if not 0 < fps <= 50:
         raise OutOfRange("fps", fps, "in (0, 50]", "1/s")
-    with Film(body, states, WIDTH, fixed=fixed, outline=outline) as film:
+    with Film(body, states, WIDTH, fixed=fixed, outline=outline, surroundings=surroundings) as film:
         palette = _palette([_picture(film, states[k]) for k in _samples(len(states))])
         frames = (
             _picture(film, s).quantize(palette=palette, dither=Image.Dither.NONE) for s in states
