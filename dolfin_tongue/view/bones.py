@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageChops, ImageDraw, ImageFilter
 from scipy.spatial import ConvexHull, QhullError
 
 from dolfin_tongue.arrays import FloatArray
@@ -151,15 +151,15 @@ def hull(points: FloatArray) -> FloatArray:
 
 def _bone(image: Image.Image, outline: FloatArray, arm: FloatArray, pen: float) -> Image.Image:
     """Lay a translucent shape with a dark edge over a picture, rounded by a few pixels."""
-    inside, edge = (Image.new("L", image.size) for _ in range(2))
-    for mask, extra in ((edge, 1.4 * pen), (inside, 0.0)):
-        draw, radius = ImageDraw.Draw(mask), 7 * pen + extra
-        corners = [tuple(corner) for corner in outline]
-        if len(corners) > 2:
-            draw.polygon(corners, fill=255)
-        _stroke(draw, [*corners, corners[0]], 255, 2 * radius)
-        _stroke(draw, [tuple(end) for end in arm], 255, 2 * (3.5 * pen + extra))
-    rim = Image.fromarray(np.asarray(edge) - np.asarray(inside))
+    inside = Image.new("L", image.size)
+    draw = ImageDraw.Draw(inside)
+    corners = [tuple(corner) for corner in outline]
+    if len(corners) > 2:
+        draw.polygon(corners, fill=255)
+    _stroke(draw, [*corners, corners[0]], 255, 14 * pen)
+    _stroke(draw, [tuple(end) for end in arm], 255, 7 * pen)
+    edge = inside.filter(ImageFilter.MaxFilter(2 * round(1.4 * pen) + 1))
+    rim = ImageChops.subtract(edge, inside)
     image.paste(BONE, mask=inside.point(lambda value: value * OPACITY // 255))
     image.paste(BONE_EDGE, mask=rim.point(lambda value: value * 9 // 10))
     return image
@@ -180,7 +180,7 @@ def _line(
     draw: ImageDraw.ImageDraw, force: Line, ends: FloatArray, time: float, pen: float
 ) -> None:
     """Draw a spring or muscle with its ends (2, 2), pixels; the far end on the skull is square."""
-    path, colour, width = ends, SPRING, 1.5 * pen
+    path, colour, width = ends, SPRING, 2.0 * pen
     if isinstance(force, LineMuscle):
         assert force.activation is not None
         share = float(np.clip(force.activation(time), 0.0, 1.0)) ** 0.5

@@ -72,6 +72,7 @@ class Film:
     outline : whether the outline of the body at rest is drawn, faintly.
     whiskers : whether velocities of the nodes are drawn as lines.
     surroundings : walls and bones, if there are any.
+    cuts : see `Surface`.
     """
 
     def __init__(
@@ -85,11 +86,12 @@ class Film:
         outline: bool = True,
         whiskers: bool = True,
         surroundings: Surroundings | None = None,
+        cuts: int = 3,
     ):
         check_states(body, states)
         self.body = body
         self.fixed: IntArray = np.unique(np.concatenate([[], *map(body.nodes, fixed)]).astype(int))
-        self.surface = Surface(body)
+        self.surface = Surface(body, cuts)
         self.stretch = whisker_time(body, states) if whiskers else 0.0
         clouds = [body.points] if outline else []
         for state in states:
