@@ -23,6 +23,9 @@ from dolfin_tongue.view.canvas import WHITE
 BONE, BONE_EDGE = (244, 232, 200), (110, 90, 48)
 SPRING, MUSCLE, IDLE = (84, 90, 100), (176, 16, 28), (222, 150, 146)
 
+#: Colours that a palette has to have.
+INKS = [BONE, BONE_EDGE, SPRING, MUSCLE, IDLE]
+
 #: Opacity of a bone, 0-255.
 OPACITY = 150
 

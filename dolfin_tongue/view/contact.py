@@ -14,7 +14,7 @@ from dolfin_tongue.state import State
 from dolfin_tongue.view.camera import ABOVE, View
 from dolfin_tongue.view.canvas import milliseconds, save_image, sheet_of
 from dolfin_tongue.view.film import Film
-from dolfin_tongue.view.picture import Scale, draw_colour_bar
+from dolfin_tongue.view.picture import FIELD_EDGES, Scale, draw_colour_bar
 from dolfin_tongue.view.scene3d import Pixels
 from dolfin_tongue.view.sheet import TILE_WIDTH
 
@@ -23,9 +23,6 @@ PALE = (240, 190, 182)
 
 #: Share of the highest pressure below which colours fade into that of the tissue.
 FADE = 0.04
-
-#: Share of the nodes in contact whose pressure may be above the scale.
-BEYOND = 0.005
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,10 @@ def contact_picture(
     scale = PressureScale(f"pressure of contact, {unit}", lambda *_: np.zeros(0), "YlGnBu")
     limits = 0.0, factor * limit
     tiles = []
-    with Film(body, states, TILE_WIDTH, view=view, outline=False, whiskers=False, cuts=8) as film:
+    with Film(
+        body, states, TILE_WIDTH, view=view, outline=False, whiskers=False, cuts=8,
+        edges=FIELD_EDGES,
+    ) as film:  # fmt: skip
         for state, values in zip(states, maps, strict=True):
             at_points = film.surface.of_nodes(factor * values[:, None])[:, 0]
             tiles.append(film.draw(state, scale.paint(at_points, limits)))
@@ -109,8 +109,8 @@ def contact_picture(
 
 def scale_end(maps: Sequence[FloatArray]) -> float:
     """Pressure at the end of a scale for these maps, Pa; 1 kPa where nothing is touched."""
-    touched = np.concatenate([values[values > 0] for values in maps])
-    return float(np.quantile(touched, 1 - BEYOND)) if touched.size else 1e3
+    highest = float(max(values.max() for values in maps))
+    return highest if highest > 0 else 1e3
 
 
 def _caption(state: State, pressure: FloatArray) -> str:

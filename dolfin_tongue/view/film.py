@@ -23,7 +23,7 @@ from dolfin_tongue.view.canvas import (
     nice_below,
     silhouette,
 )
-from dolfin_tongue.view.scene3d import OVERSAMPLING, Pixels, Stage
+from dolfin_tongue.view.scene3d import EDGES, OVERSAMPLING, Colour, Pixels, Stage
 from dolfin_tongue.view.surface import Surface
 from dolfin_tongue.view.surroundings import Neighbourhood, Surroundings
 
@@ -73,6 +73,7 @@ class Film:
     whiskers : whether velocities of the nodes are drawn as lines.
     surroundings : walls and bones, if there are any.
     cuts : see `Surface`.
+    edges : colour of the element edges, 0-255.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Film:
         whiskers: bool = True,
         surroundings: Surroundings | None = None,
         cuts: int = 3,
+        edges: Colour = EDGES,
     ):
         check_states(body, states)
         self.body = body
@@ -100,7 +102,9 @@ class Film:
         self.near = surroundings.near(body, states) if surroundings else Neighbourhood()
         clouds += self.near.clouds(states)
         self.camera = Camera.fitting(clouds, OVERSAMPLING * width, view, margin=0.04)
-        self.stage = Stage(body, self.camera, surface=self.surface, sheets=self.near.sheets)
+        self.stage = Stage(
+            body, self.camera, surface=self.surface, edge_colour=edges, sheets=self.near.sheets
+        )
         self._outline: Image.Image | None = None
         if outline:
             mask = silhouette(self.stage.frame(body.points), OVERSAMPLING)

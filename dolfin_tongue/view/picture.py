@@ -20,7 +20,8 @@ from dolfin_tongue.view.film import check_states
 from dolfin_tongue.view.scene3d import EDGES, OVERSAMPLING, Pixels, Stage
 from dolfin_tongue.view.surroundings import Neighbourhood, Surroundings
 
-_FIELD_EDGES = (90, 90, 96)
+#: Element edges on a field of colours.
+FIELD_EDGES = (90, 90, 96)
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def shape_picture(
         )
         for name in muscles
     ]
-    edges = EDGES if colour == "tissue" else _FIELD_EDGES
+    edges = EDGES if colour == "tissue" else FIELD_EDGES
     with Stage(body, camera, edge_colour=edges, edge_width=2.6, sheets=near.sheets) as stage:
         colours = None if colour == "tissue" else _colours(stage, SCALES[colour], state)
         frame = stage.frame(points, colours, near.shifts(state.time))

@@ -32,9 +32,6 @@ LIGHTS = (((-0.5, 1.2, 1.2), 0.7), ((1.5, 0.2, 1.0), 0.3), ((0.0, -0.3, 1.0), 0.
 VEIL, SOLID = 0.16, 0.8
 FACING = (-0.3, 0.35)
 
-#: Brightness of the line of a wall in the midsagittal plane over that of the wall.
-SECTION = 0.5
-
 Pixels = npt.NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
@@ -76,7 +73,7 @@ class Stage:
         self._aim()
         self._skin = self._add_skin()
         self._wires = self._add_wires(edge_colour, edge_width)
-        self._walls = [(self._add_wall(sheet), self._add_section(sheet)) for sheet in sheets]
+        self._walls = [self._add_wall(sheet) + self._add_section(sheet) for sheet in sheets]
 
     def __enter__(self) -> Stage:
         """Return the stage itself."""
@@ -133,7 +130,7 @@ class Stage:
         )  # fmt: skip
         return mesh
 
-    def _add_wall(self, sheet: Sheet) -> Any:
+    def _add_wall(self, sheet: Sheet) -> list[Any]:
         """Add a translucent wall, the fainter the more it turns its free side away."""
         import pyvista
 
@@ -149,25 +146,27 @@ class Stage:
         colours[:, 3] = np.round(255 * (VEIL + share * (SOLID - VEIL)))
         mesh.point_data["colour"] = colours
         mesh.point_data.active_normals = sheet.normals
-        return self.plotter.add_mesh(
+        actor = self.plotter.add_mesh(
             mesh, scalars="colour", rgba=True, ambient=0.7, diffuse=0.35, specular=0.1,
             specular_power=18, interpolation="Phong", copy_mesh=False, reset_camera=False,
             show_scalar_bar=False,
         )  # fmt: skip
+        return [actor]
 
-    def _add_section(self, sheet: Sheet) -> Any:
-        """Add the line of a wall in the midsagittal plane."""
+    def _add_section(self, sheet: Sheet) -> list[Any]:
+        """Add the line of a wall in the midsagittal plane, if it comes there."""
         import pyvista
 
         segments = sheet.section
         if not len(segments):
-            return None
+            return []
         lines = np.insert(np.arange(2 * len(segments)).reshape(-1, 2), 0, 2, axis=1)
         mesh = pyvista.PolyData(segments.reshape(-1, 3), lines=lines)
-        return self.plotter.add_mesh(
-            mesh, color=[c / 255 * SECTION for c in sheet.colour], lighting=False,
-            line_width=max(3.0, self.camera.size[0] / 200), reset_camera=False,
+        actor = self.plotter.add_mesh(
+            mesh, color=[c / 255 for c in sheet.ink], lighting=False,
+            line_width=max(3.0, self.camera.size[0] / 260), reset_camera=False,
         )  # fmt: skip
+        return [actor]
 
     def frame(
         self,
@@ -197,7 +196,7 @@ class Stage:
         lift = 1.5 / self.camera.scale
         self._wires.points = points + lift * self.camera.view.axes[2]
         for number, actors in enumerate(self._walls):
-            for actor in filter(None, actors):
+            for actor in actors:
                 actor.visibility = shifts is not None
                 actor.position = (0, 0, 0) if shifts is None else shifts[number]
         return self._grab()
@@ -213,7 +212,7 @@ class Stage:
         import pyvista
 
         body = [self.plotter.actors[name] for name in ("skin", "wires")]
-        walls = [actor for pair in self._walls for actor in pair if actor is not None]
+        walls = [actor for actors in self._walls for actor in actors]
         hidden = [actor for actor in (*body, *walls) if actor.visibility]
         rods = []
         for segments, colour in bundles:

@@ -20,7 +20,7 @@ from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.state import State
 from dolfin_tongue.surfaces.base import Surface
 from dolfin_tongue.surfaces.triangulated import Triangulated
-from dolfin_tongue.view.bones import Skeleton
+from dolfin_tongue.view.bones import INKS, Skeleton
 from dolfin_tongue.view.camera import Camera
 
 if TYPE_CHECKING:
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 #: Bone under its thin skin, and what the tissue only slides on.
 IVORY, SLATE = (238, 220, 176), (176, 196, 210)
+
+#: Brightness of the line of a wall in the midsagittal plane over that of the wall.
+SECTION = 0.5
 
 #: How far walls are drawn beyond the body, over its longest side.
 MARGIN = 0.25
@@ -55,6 +58,12 @@ class Sheet:
     normals: FloatArray
     middle: float = 0.0
     colour: Colour = IVORY
+
+    @property
+    def ink(self) -> Colour:
+        """Colour of the line in the midsagittal plane."""
+        red, green, blue = (round(SECTION * value) for value in self.colour)
+        return red, green, blue
 
     @property
     def section(self) -> FloatArray:
@@ -209,6 +218,12 @@ class Neighbourhood:
     def shifts(self, time: float) -> FloatArray:
         """Return the translation of each sheet at a time (s), shape (s, 3), m."""
         return np.array([wall.shift(time)[0] for wall in self._walls]).reshape(-1, 3)
+
+    @property
+    def inks(self) -> list[Colour]:
+        """Colours of thin lines."""
+        inks = list(dict.fromkeys(sheet.ink for sheet in self.sheets))
+        return inks + (INKS if self.skeleton is not None else [])
 
     def clouds(self, states: Sequence[State]) -> list[FloatArray]:
         """Points that a camera has to see, each of shape (k, 3), m."""
