@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from PIL import Image, ImageChops, ImageDraw, ImageFilter
+from PIL import Image, ImageDraw
+from scipy.ndimage import maximum_filter
 from scipy.spatial import ConvexHull, QhullError
 
 from dolfin_tongue.arrays import FloatArray
@@ -161,10 +162,13 @@ def _bone(image: Image.Image, outline: FloatArray, arm: FloatArray, pen: float) 
         draw.polygon(corners, fill=255)
     _stroke(draw, [*corners, corners[0]], 255, 14 * pen)
     _stroke(draw, [tuple(end) for end in arm], 255, 7 * pen)
-    edge = inside.filter(ImageFilter.MaxFilter(2 * round(1.4 * pen) + 1))
-    rim = ImageChops.subtract(edge, inside)
-    image.paste(BONE, mask=inside.point(lambda value: value * OPACITY // 255))
-    image.paste(BONE_EDGE, mask=rim.point(lambda value: value * 9 // 10))
+    rim = round(1.4 * pen)
+    left, upper, right, lower = inside.getbbox() or (0, 0, 0, 0)
+    box = (max(left - rim, 0), max(upper - rim, 0), right + rim, lower + rim)
+    solid = np.asarray(inside.crop(box))
+    edge = maximum_filter(solid, 2 * rim + 1) - solid  # Pillow's own filter is 20 times slower
+    image.paste(BONE, box, Image.fromarray((solid // 255) * np.uint8(OPACITY)))
+    image.paste(BONE_EDGE, box, Image.fromarray(edge))
     return image
 
 
