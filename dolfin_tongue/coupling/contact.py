@@ -20,8 +20,8 @@ from dolfin_tongue.coupling.base import Arguments, Coupling, Shifts, Sparse
 from dolfin_tongue.mesh import MixedSpace
 from dolfin_tongue.surfaces.base import Gap
 
-#: Gap, in ranges of the barrier, to which a touching point may go in one step. At 1.25 no step of 36
-#: drops at 0.1 to 2 m/s raised the energy; at 1.5 and 2 some did, by 0.1 to 0.2 % of the first one.
+#: Gap, in ranges of the barrier, to which a touching point may go in one step. At 1.25 no step of
+#: 18 drops at 0.1 to 2 m/s raised the energy; at 1.5 and 2 some did, by 0.2 % of the first one.
 LEAP = 1.25
 
 
