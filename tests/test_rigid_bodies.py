@@ -328,3 +328,30 @@ def test_bad_combinations_are_refused():
         Scene(BLOCK, (TISSUE,), (carrier(forces=(replace(line, to="bone"),)),))
     with pytest.raises(BadScene, match="must be 0 at t = 0"):
         Scene(BLOCK, (TISSUE,), (carrier(motion={"x": Still(0.01)}),))
+
+
+# -- runs ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", ["fenicsx", "direct"])
+def test_runs_record_bones_and_resume(solver, tmp_path):
+    """A run that is taken up again goes on with the coordinates that were there."""
+    pytest.importorskip("dolfinx")
+    from dolfin_tongue.direct import Implicit
+    from dolfin_tongue.pictures import read_table
+    from dolfin_tongue.run import simulate
+    from dolfin_tongue.solve.dynamics import TimeSteps
+
+    steps = TimeSteps(2e-3) if solver == "fenicsx" else Implicit(2e-3)
+    scene = hinged_bone()
+    whole = simulate(scene, 0.08, tmp_path / "whole", steps)
+    simulate(scene, 0.04, tmp_path / "parts", steps)
+    parts = simulate(scene, 0.08, tmp_path / "parts", steps, resume=True)
+    table = read_table(tmp_path / "parts" / "trajectories.csv")
+    assert len(table["bone_angle_rad"]) == 41
+    assert np.array_equal(table["bone_angle_rad"][-1:], parts.last.rigid[:, 2])
+    assert [len(frame.rigid) for frame in parts.frames] == [1] * 5
+    assert parts.frames[-1].rigid == pytest.approx(parts.last.rigid)
+    # The seam estimates the acceleration anew: an error of the method's order, not of a jump.
+    assert parts.last.rigid[0, 2] == pytest.approx(whole.last.rigid[0, 2], rel=1e-3)
+    assert abs(whole.last.rigid[0, 2]) > 0.1
