@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.extremes import charts, peers, scenes
+from benchmarks.extremes import charts, contacts, peers, scenes
 from benchmarks.extremes.outcome import Outcome, attempt_alpha2, attempt_march, read_table
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.control import Ramp, Step
@@ -168,6 +168,30 @@ def tongues(report: Report) -> None:
         report.runs(name, scenes.tongue(body, half, **change), 0.4)
     for dt in (20e-3, 50e-3):
         report.runs(f"dt {1e3 * dt:g} ms", scenes.tongue(body, half), 0.5, both(dt))
+
+
+def boundaries(report: Report) -> None:
+    """Impact, squeezing, light and heavy bones, films on bad cells, sliding."""
+    for speed, tilt, name in ((0.1, 0, "face"), (1.0, 0, "face"), (1.0, 30, "corner")):
+        scene, start = contacts.dropped_block(speed, tilt)
+        for method in both(2.5e-3):
+            label = f"block dropped on a {name} at {speed:g} m/s"
+            outcome, _ = attempt_march(scene, 0.1, method, report.run_folder(label, method), start)
+            report.add(label, method, outcome)
+    for distance, duration in ((0.01, 0.1), (0.02, 0.02)):
+        name = f"palate comes down by {1e3 * distance:g} mm in {1e3 * duration:g} ms"
+        report.runs(name, contacts.closing_palate(distance, duration), 0.2)
+    for share, duration in ((0.5, 0.1), (1.0, 0.05)):
+        name = f"squeezed: mandible closes by {10 * share:g} degrees in {1e3 * duration:g} ms"
+        report.runs(name, contacts.squeezed_tongue(share, duration), 0.25)
+    for mass in (1e-3, 10.0):
+        report.runs(f"free mandible of {mass:g} kg", contacts.weighed_mandible(mass), 0.3)
+    for sigma in (0.073, 10.0):
+        name = f"film of {sigma:g} N/m on a corner of 5 % scaled Jacobian"
+        report.runs(name, scenes.film_on_a_corner(sigma), 0.1)
+    for radius, gravity in ((0.1, 500.0), (0.03, 50.0)):
+        name = f"sliding in a bowl of {100 * radius:g} cm under {gravity:g} m/s2"
+        report.runs(name, contacts.sliding_block(radius, gravity), 0.2)
 
 
 def rests(report: Report) -> None:
@@ -372,7 +396,16 @@ def main(options: Options) -> dict[str, object]:
     """Run the benchmark; returns the table."""
     options.folder.mkdir(parents=True, exist_ok=True)
     report = Report(options.folder)
-    for part in (blocks, tongues, febio_statics, contractions, rests, febio_curves, swings):
+    for part in (
+        blocks,
+        tongues,
+        boundaries,
+        febio_statics,
+        contractions,
+        rests,
+        febio_curves,
+        swings,
+    ):
         part(report)
     published(report, options.data)
     points = stiffness_map(options.folder)

@@ -18,6 +18,8 @@ from dolfin_tongue.state import State
 #: Fields of a frame: name, place, components.
 FIELDS = (("displacement", "Node", 3), ("velocity", "Node", 3), ("pressure", "Cell", 1))
 
+NO_BODIES = np.zeros((0, 3))
+
 
 class Frames:
     """The frames in a folder.
@@ -26,10 +28,11 @@ class Frames:
     ----------
     folder : gets ``fields.xdmf`` and ``frames/``.
     body : the body that moves.
+    bones : number of rigid bodies.
     """
 
-    def __init__(self, folder: Path, body: Body):
-        self.folder, self.body = folder, body
+    def __init__(self, folder: Path, body: Body, bones: int = 0):
+        self.folder, self.body, self.bones = folder, body, bones
         self.times: list[float] = []
 
     def _path(self, name: str) -> Path:
@@ -43,6 +46,8 @@ class Frames:
             write_array(self._path("cells"), self.body.cells.astype(np.int64))
         for name, _, _ in FIELDS:
             write_array(self._path(f"{name}_{number:05d}"), getattr(state, name))
+        if self.bones:
+            write_array(self._path(f"rigid_{number:05d}"), state.rigid)
         self.times.append(state.time)
         write_text(self.folder / "fields.xdmf", self._index())
 
@@ -56,12 +61,15 @@ class Frames:
             name: np.fromfile(self._path(f"{name}_{number:05d}"), dtype="<f8")
             for name, _, _ in FIELDS
         }
-        shape = self.body.points.shape
+        shape, rigid = self.body.points.shape, NO_BODIES
+        if self.bones:
+            rigid = np.fromfile(self._path(f"rigid_{number:05d}"), dtype="<f8").reshape(-1, 3)
         return State(
             self.times[number],
             arrays["displacement"].reshape(shape),
             arrays["velocity"].reshape(shape),
             arrays["pressure"],
+            rigid=rigid,
         )
 
     def read_all(self) -> list[State]:

@@ -19,6 +19,7 @@ from dolfin_tongue.errors import BadScene, TongueError, require_positive
 from dolfin_tongue.files import replacing, write_json, write_text
 from dolfin_tongue.frames import Frames
 from dolfin_tongue.observe import landmark_positions
+from dolfin_tongue.rigid import COORDINATES
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.state import State
 
@@ -81,7 +82,8 @@ class Table:
 class Recorder:
     """Everything that a run leaves in its folder.
 
-    ``trajectories.csv`` positions of the landmarks (m), ``steps.csv`` one row per accepted step,
+    ``trajectories.csv`` positions of the landmarks (m) and coordinates of rigid bodies (m, rad),
+    ``steps.csv`` one row per accepted step,
     ``fields.xdmf`` and ``frames/`` for ParaView, ``checkpoint.npz`` to resume, ``summary.json``.
 
     Parameters
@@ -98,7 +100,7 @@ class Recorder:
         self._fingerprint = fingerprint(scene)
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = _claim(folder)
-        self.frames = Frames(folder, scene.body)
+        self.frames = Frames(folder, scene.body, len(scene.rigid_bodies))
         self.trajectories = Table(folder / "trajectories.csv")
         self.steps = Table(folder / "steps.csv")
 
@@ -108,6 +110,9 @@ class Recorder:
         row = {"time_s": state.time}
         for name, position in positions.items():
             row |= {f"{name}_{axis}_m": float(x) for axis, x in zip("xyz", position, strict=True)}
+        for bone, q in zip(self.scene.rigid_bodies, state.rigid, strict=True):
+            units = zip(COORDINATES, ("m", "m", "rad"), q, strict=True)
+            row |= {f"{bone.name}_{name}_{unit}": float(x) for name, unit, x in units}
         self.trajectories.append(row)
         step = {"time_s": state.time, "step_s": state.step, "newton_iterations": state.iterations}
         self.steps.append(step | observed)
@@ -122,7 +127,8 @@ class Recorder:
         with replacing(self.folder / "checkpoint.npz") as path:
             np.savez(
                 path, time=state.time, displacement=state.displacement, velocity=state.velocity,
-                pressure=state.pressure, step=state.step, frame_times=self.frames.times,
+                pressure=state.pressure, step=state.step, rigid=state.rigid,
+                rigid_rate=state.rigid_rate, sliding=state.sliding, frame_times=self.frames.times,
                 memory=json.dumps(memory), fingerprint=self._fingerprint,
             )  # fmt: skip
 
@@ -160,10 +166,12 @@ class Recorder:
         """State of a checkpoint; ValueError if it is not one of this body."""
         state = State(
             float(saved["time"]), saved["displacement"], saved["velocity"], saved["pressure"],
-            float(saved["step"]),
+            float(saved["step"]), rigid=saved["rigid"], rigid_rate=saved["rigid_rate"],
+            sliding=saved["sliding"],
         )  # fmt: skip
-        arrays = (state.displacement, state.velocity, state.pressure)
-        shapes = (self.scene.body.points.shape,) * 2 + ((len(self.scene.body.cells),),)
+        arrays = (state.displacement, state.velocity, state.pressure, state.rigid)
+        nodes, cells = self.scene.body.points.shape, (len(self.scene.body.cells),)
+        shapes = (nodes, nodes, cells, (len(self.scene.rigid_bodies), 3))
         finite = all(np.isfinite(a).all() for a in arrays)
         if not finite or tuple(a.shape for a in arrays) != shapes:
             raise ValueError("the checkpoint does not fit the body")
@@ -204,6 +212,8 @@ def _feed(digest: Any, value: Any) -> None:
         digest.update(repr(float(value)).encode())
     elif hasattr(value, "__code__"):
         digest.update(value.__code__.co_code + repr(value.__code__.co_consts).encode())
+        closure = value.__closure__ or ()
+        _feed(digest, (value.__defaults__, [cell.cell_contents for cell in closure]))
     elif hasattr(value, "__dict__"):
         digest.update(type(value).__qualname__.encode())
         _feed(digest, vars(value))

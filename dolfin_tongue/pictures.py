@@ -2,42 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from dolfin_tongue import view
+from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.boundary import Attached
 from dolfin_tongue.run import Run
 from dolfin_tongue.state import State
+from dolfin_tongue.view.plots import contact_names, rigid_names
 
 #: Frames on a contact sheet.
 SHEET_FRAMES = 15
 
+#: Frames on a picture of contact pressures.
+PRESSURE_FRAMES = 8
 
-def picture_run(run: Run, title: str) -> None:
+
+def picture_run(
+    run: Run, title: str, contact_pressure: Callable[[State], FloatArray] | None = None
+) -> None:
     """Draw a run into its folder.
 
     ``sheet.png`` frames with nodes' velocities, ``animation.gif``, ``fibres/`` a picture of each
-    muscle, ``trajectories.png``, ``energy.png``, ``shape.png`` the last shape.
+    muscle, ``trajectories.png``, ``energy.png``, ``shape.png`` the last shape. Walls that the body
+    touches or slides on, and rigid bodies, are drawn with it. Where there are any:
+    ``contact.png`` forces and areas of contact, ``rigid.png`` coordinates of rigid bodies.
 
     Parameters
     ----------
     run : a finished run.
     title : over the sheet.
+    contact_pressure : pressure of contact at the nodes in a state, shape (n,), Pa; with it,
+        ``pressure.png`` shows where the tissue is touched.
     """
     body, folder = run.scene.body, run.folder
     frames = view.telling_frames(run.frames, SHEET_FRAMES)
     fixed = [r for s in run.scene.supports if isinstance(s, Attached) for r in s.regions]
-    view.contact_sheet(body, frames, folder / "sheet.png", title=title, fixed=fixed)
-    view.animation(body, run.frames, folder / "animation.gif", fixed=fixed)
+    around = view.Surroundings.of(run.scene)
+    view.contact_sheet(
+        body, frames, folder / "sheet.png", title=title, fixed=fixed, surroundings=around
+    )
+    view.animation(body, run.frames, folder / "animation.gif", fixed=fixed, surroundings=around)
     if body.fibres.muscles:
         view.fibre_pictures(body, folder / "fibres")
-    view.shape_picture(body, run.last, folder / "shape.png")
-    view.trajectories(_landmark_paths(folder), folder / "trajectories.png")
-    view.energy_plot(read_table(folder / "steps.csv"), folder / "energy.png")
+    view.shape_picture(body, run.last, folder / "shape.png", surroundings=around)
+    places, steps = read_table(folder / "trajectories.csv"), read_table(folder / "steps.csv")
+    view.trajectories(_landmark_paths(places), folder / "trajectories.png")
+    view.energy_plot(steps, folder / "energy.png")
+    if contact_names(steps):
+        view.contact_plot(steps, folder / "contact.png")
+    if rigid_names(places):
+        view.rigid_plot(places, folder / "rigid.png")
+    if contact_pressure is not None:
+        chosen = view.telling_frames(run.frames, PRESSURE_FRAMES)
+        maps = [contact_pressure(state) for state in chosen]
+        view.contact_picture(body, chosen, maps, folder / "pressure.png", title=title)
 
 
 def picture_shapes(body: Body, shapes: Mapping[str, State], path: Path) -> None:
@@ -51,10 +74,12 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
     return {name: np.atleast_1d(table[name]) for name in table.dtype.names or ()}
 
 
-def _landmark_paths(folder: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _landmark_paths(
+    columns: Mapping[str, np.ndarray],
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return times (s) and positions, shape (k, 3), mm, of each landmark."""
-    columns = read_table(folder / "trajectories.csv")
-    names = [name[: -len("_x_m")] for name in columns if name.endswith("_x_m")]
+    # Rigid bodies have columns too, but none for y.
+    names = [name[: -len("_y_m")] for name in columns if name.endswith("_y_m")]
     return {
         name: (
             columns["time_s"],

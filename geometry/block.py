@@ -81,7 +81,7 @@ def unit_block(
     BadMesh : a region outside the block, or with boxes of several dimensions.
     """
     factors = _factors(refinement)
-    with _model("unit_block"):
+    with gmsh_model("unit_block"):
         entities = _Lattice(tuple(divisions))
         entities.build(factors)
         for name, boxes in (regions or {}).items():
@@ -100,7 +100,7 @@ def _factors(refinement: int | Sequence[int]) -> tuple[int, int, int]:
 
 
 @contextmanager
-def _model(name: str) -> Iterator[None]:
+def gmsh_model(name: str) -> Iterator[None]:
     """Open a silent gmsh model; a caller's gmsh session and model come back as they were."""
     outer = bool(gmsh.isInitialized())
     if not outer:

@@ -105,7 +105,8 @@ def preliminary_tongue(
         nodes), ``upper_surface``, ``lower_surface``, ``midsagittal`` (the sheet at s = 1/3),
         ``midsagittal_contour`` (its outline, ordered from the hyoid along the underside to
         the tip and back over the dorsum to the root) and ``dorsum`` (its upper line, from root to
-        tip); landmarks ``tip, blade, dorsum, back, root, body, underside``; eight muscles.
+        tip); the surface ``upper``, which faces the palate; landmarks ``tip, blade, dorsum,
+        back, root, body, underside``; eight muscles.
 
     Raises
     ------
@@ -134,7 +135,13 @@ def preliminary_tongue(
         name="preliminary_tongue",
     )
     # The shape is checked by now: fibre densities need volumes > 0.
-    return replace(body, fibres=block_fibres(block, solid))
+    surfaces = {"upper": _faces_within(body, regions["upper_surface"])}
+    return replace(body, fibres=block_fibres(block, solid), surfaces=surfaces)
+
+
+def _faces_within(body: Body, nodes: IntArray) -> IntArray:
+    """Outer faces whose corners are all among some nodes, shape (k, 4)."""
+    return body.boundary[np.isin(body.boundary, nodes).all(axis=1)]
 
 
 def _outline(block: Block) -> IntArray:

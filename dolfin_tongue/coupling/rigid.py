@@ -36,14 +36,15 @@ class RigidBodies(Coupling):
             arms.append(body.arms(np.concatenate([corners[c].mean(axis=1) for _, c in groups])))
         self._dofs, self._arms = dofs, arms
         self.dofs = np.concatenate(dofs).astype(np.int32)
+        self._every_arm = np.concatenate(arms)
+        self._owner = np.repeat(np.arange(len(arms)), [len(part) for part in arms])
 
     def _own(self, y: FloatArray) -> FloatArray:
         return y[self.positions]
 
     def displacement(self, q: FloatArray) -> FloatArray:
         """Displacement of all attached dofs, shape (k, 3), m."""
-        parts = zip(self._arms, self._at, strict=True)
-        return np.concatenate([plane.displacement(arms, q[at]) for arms, at in parts])
+        return plane.displacement(self._every_arm, q.reshape(-1, 3)[self._owner])
 
     def spread(self, q: FloatArray, size: int) -> Sparse:
         """T as a sparse matrix from coordinates to mixed arrays, shape (size, 3b)."""
@@ -68,7 +69,12 @@ class RigidBodies(Coupling):
         q : coordinates.
         rows : residual with the nodes' rows of momentum.
         """
-        return -(self.spread(q, len(rows)).T @ rows)
+        angles = q.reshape(-1, 3)[self._owner, 2]
+        arm, force = plane.turned(self._every_arm, angles), -rows[self.dofs]
+        moment = arm[:, 2] * force[:, 0] - arm[:, 0] * force[:, 2]
+        parts = (force[:, 0], force[:, 2], moment)
+        sums = [np.bincount(self._owner, part, len(self.bodies)) for part in parts]
+        return np.stack(sums, axis=1).ravel()
 
     def balance(self, at: Arguments, rows: FloatArray) -> FloatArray:
         """Inertia minus all forces on the coordinates (61), (62), shape (3b,), N and N m.

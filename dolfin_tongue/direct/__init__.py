@@ -8,8 +8,8 @@ share the dataclasses of the terms, of which only numbers are read here.
 Reading order: `elements` (shape functions, kappa) - `mesh` - `volume` (96), (101) - `tensors`,
 `isochoric`, `passive`, `rates` (stress and moduli at points) - `points` (element loops) - `faces`,
 `membranes` (47) - `forces` (which term has which law) - `model` (the semi-discrete equations, no
-dt) - `multipliers` (53)-(57) - `limits`, `integrate` (explicit methods) - `saddle`, `implicit` -
-`balance`, `trouble`.
+dt), with `slides` (49)-(52) and `bodies` (61), (62) - `multipliers` (53)-(57) - `limits`,
+`integrate` (explicit methods) - `saddle`, `border`, `implicit` - `balance`, `trouble`.
 
 Conventions
 -----------
@@ -19,6 +19,8 @@ n points, m cells of one kind with k nodes and q quadrature points; SI units.
 - cells: (m, k); F, its rate and the first Piola-Kirchhoff stress P: (m, q, 3, 3), index i in space,
   J in the reference body; moduli dP_iJ/dF_kL: (m, q, 9, 9).
 - element matrices: (m, 3k, 3k), ordered by component, then node.
+- with rigid bodies, nodal arrays inside the solver have rows for them too, (N, 3): `bodies`; with
+  sliding nodes, constraints and multipliers (c,) have theirs behind those of the cells: `slides`.
 - pressure: (m,), Pa, positive in compression: the multiplier of V' = Gamma (F + lambda dA/dU).
   P holds -p J F^-T, whose nodal force is +p dA/dU.
 

@@ -29,10 +29,17 @@ class Drift:
 
 
 def momentum(model: Model, state: State) -> tuple[FloatArray, FloatArray]:
-    """Momentum, N s, and angular momentum about the origin, N m s; each of shape (3,)."""
+    """Momentum, N s, and angular momentum about the origin, N m s; each of shape (3,).
+
+    Of the tissue and the rigid bodies.
+    """
     nodal = model.mass @ state.velocity
     position = model.mesh.points + state.displacement
-    return nodal.sum(axis=0), np.cross(position, nodal).sum(axis=0)
+    linear, angular = nodal.sum(axis=0), np.cross(position, nodal).sum(axis=0)
+    if model.bodies is not None:
+        own = model.bodies.momentum(state.rigid, state.rigid_rate)
+        linear, angular = linear + own[0], angular + own[1]
+    return linear, angular
 
 
 def drift(model: Model, states: Iterable[State]) -> Drift:
@@ -44,7 +51,9 @@ def drift(model: Model, states: Iterable[State]) -> Drift:
     kinetic = max(0.5 * float(np.sum(s.velocity * (model.mass @ s.velocity))) for s in states)
     pairs = [momentum(model, s) for s in states]
     linear, angular = (np.array(part) for part in zip(*pairs, strict=True))
-    energy = np.array([model.energy(s.displacement, s.velocity) for s in states])
+    energy = np.array(
+        [model.energy(s.displacement, s.velocity, s.rigid, s.rigid_rate) for s in states]
+    )
     return Drift(
         float(np.linalg.norm(linear - linear[0], axis=1).max() / nodal.sum(axis=1).max()),
         float(np.linalg.norm(angular - angular[0], axis=1).max() / (nodal @ lever).max()),

@@ -14,6 +14,13 @@ in one step, is left out. Solving G V = 0 keeps lambda of order 2, which the con
 would not. What the volumes drift in a step, O(h^3), is then taken out of U with the same matrix
 (a correction of least energy), so that every accepted state keeps its volumes.
 
+Sliding nodes are constraints like the volumes, in all of this. A rigid body (`bodies`) adds its
+unknown coordinates q: U and V of its points follow from q and q', and the stage asks for the
+balance of the body with the inertia of its points as everywhere, M (V - V_k)/(d h) with V = T q' at
+the end of the stage. So all momentum that leaves a node arrives at another one, and a free body
+keeps its linear momentum to round-off, turning or not. Newton's matrix gets a border with the T of
+the points and its turning (`border`). The drift of the constraints is taken out of the nodes alone.
+
 Two ways to use it:
 - Newton to a tolerance, with the factors kept over iterations and steps while they serve;
 - linearly implicit (`corrections = 1`): one tangent per step, at the predicted inner stage, one
@@ -34,6 +41,7 @@ from math import sqrt
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.direct.border import Border, condensed, condensed_gradient
 from dolfin_tongue.direct.integrate import before
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
@@ -62,9 +70,11 @@ class Implicit:
     dt : step, s; with `tolerance` the first one.
     tolerance : largest error of a nodal displacement per step, m; None keeps dt fixed.
     corrections : None iterates to `newton`; 1 is the linearly implicit method, n takes n solves.
-    newton : largest nodal displacement by which the last Newton update of a stage may move, m; the
-        error it leaves is smaller by the contraction. Ten times more is noise in velocities.
-    volume : largest relative volume change of a cell at the end of a step.
+    newton : largest nodal displacement by which the last Newton update of a stage may move, m (or
+        angle, rad); the error it leaves is smaller by the contraction. Ten times more is noise in
+        velocities.
+    volume : largest relative volume change of a cell at the end of a step, and distance of a
+        sliding node from its surface over the mean size of the cells.
     patience : the factors are renewed when more than this many further iterations are expected
         from the contraction so far; 0 renews them in every iteration (full Newton).
     iterations : at most, per stage, with fresh factors.
@@ -111,8 +121,8 @@ class Motion:
     Parameters
     ----------
     time : s.
-    u, v, a : displacement, velocity, acceleration, shape (n, 3).
-    pressure : shape (m,), Pa.
+    u, v, a : displacement, velocity, acceleration of all rows, shape (N, 3).
+    pressure : multipliers of all constraints, shape (c,), Pa.
     """
 
     time: float
@@ -135,21 +145,22 @@ class ImplicitStepper:
         self.initial = Acceleration(model, None)
         self.factorisations = self.evaluations = self.iterations = 0
         self._solver: Solver
+        self._nodal_solver: Solver  # with rigid bodies standing still
         self._stale = True  # whether the next correction needs new factors
         self._solver_step = 0.0
-        zero = np.zeros_like(model.load)
-        self._now = Motion(0.0, zero, zero, zero, np.zeros(model.cell_count))
+        zero = np.zeros(model.shape)
+        self._now = Motion(0.0, zero, zero, zero, np.zeros(model.constraint_count))
+        self._points = zero if model.bodies is None else zero[: model.bodies.centres.stop]
         self._inner: Motion | None = None
 
     # -- marching ------------------------------------------------------------------------------
 
     def begin(self, state: State) -> State:
         """Find acceleration and pressures of a beginning."""
-        u, v = state.displacement.copy(), state.velocity.copy()
-        self.model.hold(state.time, u, v)
+        u, v = self.model.rows(state)
         a, pressure = self.initial(state.time, u, v)
         self._now, self._inner, self._stale = Motion(state.time, u, v, a, pressure), None, True
-        return State(state.time, u, v, pressure, state.step)
+        return self.model.state(state.time, u, v, pressure, state.step)
 
     def segment(self, state: State, end: float) -> Iterator[State]:
         """March to the end of a smooth stretch."""
@@ -183,7 +194,8 @@ class ImplicitStepper:
                 raise lost(self.model, state, dt, cause)
         self._now, self._inner = new, inner
         count = self.iterations - iterations
-        return State(new.time, new.u, new.v, new.pressure, dt, count), self._next(dt, factor)
+        state = self.model.state(new.time, new.u, new.v, new.pressure, dt, count)
+        return state, self._next(dt, factor)
 
     def _factor(self, error: float) -> float:
         """Factor by which the error allows the step to change."""
@@ -219,7 +231,8 @@ class ImplicitStepper:
         v = now.v + W * h * (now.a + inner.a)
         new = self._stage(time, h, end, u, v, guess, pressure)
         first, second, third = ERROR_WEIGHTS
-        error = h * np.abs(first * now.v + second * inner.v + third * new.v).max()
+        nodal = (first * now.v + second * inner.v + third * new.v)[: len(self._points)]
+        error = h * np.abs(nodal).max()
         self._project(new)
         return inner, new, float(error)
 
@@ -306,46 +319,86 @@ class ImplicitStepper:
     ) -> float:
         """One Newton update; the largest displacement it makes, m."""
         model = self.model
-        gradients = model.volume_gradients(point.u)
-        force = model.force(time, point.u, point.v)
-        model.add_constraint_force(gradients, point.pressure, force)
-        force -= model.mass @ point.a
+        gradients = model.constraint_gradients(point.u)
+        force = self._balance(time, point, gradients)
         rate = model.constraint_rate(gradients, point.v)
-        velocity, pressure = self._solver(force[model.free].ravel(), -rate)
-        point.v[model.free] += velocity.reshape(-1, 3)
+        momentum = model.reduced(time, point.u, point.v, point.a, force)
+        velocity, pressure = self._solver(momentum, -rate)
+        model.add_unknowns(velocity, point.v)
         point.pressure += pressure
         self._place(point, u_known, v_known, step)
         self.evaluations += 1
         self.iterations += 1
         return step * float(np.abs(velocity).max())
 
+    def _balance(self, time: float, point: Motion, gradients: list[FloatArray]) -> FloatArray:
+        """Sum all forces, minus inertia on all rows, shape (N, 3), N."""
+        force = self.model.whole(self.model.force(time, point.u, point.v))
+        self.model.add_constraint_force(gradients, point.pressure, force)
+        force -= self.model.whole_mass @ point.a
+        return force
+
     def _renew(self, time: float, point: Motion, step: float, h: float) -> None:
         """Factor Newton's matrix at a state."""
         model = self.model
         matrices = model.element_tangents(time, point.u, point.v, step, 1.0)
         model.add_constraint_hessians(point.u, -step * point.pressure, matrices)
-        for part, mass in zip(matrices, model.element_masses, strict=True):
+        for part, mass in zip(matrices, model.element_masses, strict=False):
             count = mass.shape[1]
             for i in range(3):
                 rows = slice(i * count, (i + 1) * count)
                 part[:, rows, rows] += mass / step
         if not all(np.isfinite(part).all() for part in matrices):
             raise Failed("the tangent is not finite")
-        self._solver = self.saddle.factor(matrices, model.volume_gradients(point.u))
+        gradients = model.constraint_gradients(point.u)
+        self._nodal_solver = self._solver = self.saddle.factor(matrices, gradients)
+        if model.bodies is not None and model.bodies.unknown.size:
+            self._solver = self._bordered(time, point, step, matrices, gradients)
         self._solver_step, self._stale = h, False
         self.factorisations += 1
 
+    def _bordered(
+        self,
+        time: float,
+        point: Motion,
+        step: float,
+        matrices: list[FloatArray],
+        gradients: list[FloatArray],
+    ) -> Border:
+        """Border Newton's matrix with the unknown coordinates.
+
+        Like the derivative of G V by U, that of the stiffness forces by the turning of T within the
+        step is left out.
+        """
+        model, bodies = self.model, self.model.bodies
+        assert bodies is not None
+        rows = bodies.columns(point.u)
+        turn = step * point.v[bodies.coordinates, 2]
+        columns = bodies.columns(point.u, turn)
+        C, R, E = condensed(model, matrices, columns, rows)
+        by_q, by_v = bodies.tangents(time, point.u, point.v, self._balance(time, point, gradients))
+        centres = np.einsum(
+            "k,kir,kis->rs", model.whole_mass.diagonal()[bodies.rows] * bodies.is_centre,
+            rows, columns,
+        )  # fmt: skip
+        inertia = centres + np.diag(bodies.inertia[bodies.unknown])
+        E = E + step * by_q + by_v + inertia / step
+        G_columns = condensed_gradient(model, gradients, columns)
+        G_rows = -condensed_gradient(model, gradients, rows).T
+        return Border(self._nodal_solver, (C, G_columns), (R, G_rows), E)
+
     def _project(self, point: Motion) -> None:
-        """Take the drift of the volumes out of the displacement."""
+        """Take the drift of the constraints out of the displacement of the free nodes."""
         model = self.model
         nothing = np.zeros(3 * len(model.free))
         for _ in range(10):
             change, _ = model.constraint(point.u)
-            largest = np.abs(change / model.rest_volumes).max()
+            largest = np.abs(change / model.sizes).max()
             if not np.isfinite(largest):
                 break
             if largest <= self.method.volume:
                 return
-            correction, _ = self._solver(nothing, -change)
+            correction, _ = self._nodal_solver(nothing, -change)
             point.u[model.free] += correction.reshape(-1, 3)
-        raise Failed(f"the volumes are not kept ({largest:.1g})")
+        kept = "volumes" if model.slides is None else "volumes and the sliding nodes"
+        raise Failed(f"the {kept} are not kept ({largest:.1g})")

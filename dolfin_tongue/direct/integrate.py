@@ -68,7 +68,12 @@ class Direct:
     def rest(self, time: float = 0.0) -> State:
         """Return the reference configuration at rest."""
         zero = np.zeros_like(self.model.load)
-        return State(time, zero, zero.copy(), np.zeros(self.model.cell_count))
+        count = (len(self.model.problem.rigid_bodies), 3)
+        slides = 0 if self.model.slides is None else len(self.model.slides.nodes)
+        return State(
+            time, zero, zero.copy(), np.zeros(self.model.cell_count), rigid=np.zeros(count),
+            rigid_rate=np.zeros(count), sliding=np.zeros(slides),
+        )  # fmt: skip
 
     def march(self, end: float, start: State | None = None) -> Iterator[State]:
         """March to an end time, which is met exactly; yields every accepted state.
@@ -155,21 +160,22 @@ class RungeKutta4Stepper:
         self.dt = method.dt
         self._steps = 0
         self._started = False
-        self._beginning = np.zeros(0)  # acceleration at the last accepted state
+        #: Displacement, velocity, acceleration at the last accepted state, all rows.
+        self._now = (np.zeros(0), np.zeros(0), np.zeros(0))
 
     def begin(self, state: State) -> State:
         """Find the pressures of a beginning and judge the step."""
-        displacement, velocity = state.displacement.copy(), state.velocity.copy()
-        self.model.hold(state.time, displacement, velocity)
-        self._beginning, pressure = self.acceleration(state.time, displacement, velocity)
-        state = State(state.time, displacement, velocity, pressure, state.step)
+        u, v = self.model.rows(state)
+        a, multipliers = self.acceleration(state.time, u, v)
+        self._now = u, v, a
+        state = self.model.state(state.time, u, v, multipliers, state.step)
         self._judge(state, state.time)
         self._started = True
         return state
 
     def _judge(self, state: State, time: float) -> None:
         """Refuse the step, or cut it, where it is beyond the stability limit."""
-        limit = self.limits(time, state.displacement, state.velocity, state.pressure)
+        limit = self._limit(state, time)
         if limit.step >= self.dt:
             return
         text = f"{limit.step:.3g} s, set by {limit.cause}"
@@ -187,6 +193,10 @@ class RungeKutta4Stepper:
             reason = f"dt = {self.dt:g} s is beyond the stability limit of {text}"
             raise NotConverged(reason, state.time, "Take a smaller dt, cut=True, or Implicit")
 
+    def _limit(self, state: State, time: float) -> Limit:
+        """Stability limit at the last accepted state."""
+        return self.limits(time, *self._now[:2], self.model.multipliers(state))
+
     def segment(self, state: State, end: float) -> Iterator[State]:
         """March to the end of a smooth stretch with equal steps of at most dt."""
         while state.time < end:
@@ -201,7 +211,7 @@ class RungeKutta4Stepper:
 
     def _step(self, state: State, dt: float, time: float, end: float) -> State:
         """One step; the pressure is that of the new state."""
-        u, v, a1, t = state.displacement, state.velocity, self._beginning, state.time
+        (u, v, a1), t = self._now, state.time
         with np.errstate(all="ignore"):
             u2, v2 = self._held(t + dt / 2, u + dt / 2 * v, v + dt / 2 * a1)
             a2, _ = self.acceleration(before(t + dt / 2, end), u2, v2)
@@ -213,11 +223,12 @@ class RungeKutta4Stepper:
             v_new = v + dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
             self.model.hold(time, u_new, v_new)
             change, _ = self.model.constraint(u_new)
-            largest = np.abs(change / self.model.rest_volumes).max()
+            largest = np.abs(change / self.model.sizes).max()
             if not (np.isfinite(v_new).all() and largest <= LOST_VOLUME):
                 raise lost(self.model, state, dt, self._blame(state, dt, end))
-            self._beginning, pressure = self.acceleration(before(time, end), u_new, v_new)
-        return State(time, u_new, v_new, pressure, dt)
+            a, multipliers = self.acceleration(before(time, end), u_new, v_new)
+        self._now = u_new, v_new, a
+        return self.model.state(time, u_new, v_new, multipliers, dt)
 
     def _held(self, time: float, u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         self.model.hold(time, u, v)
@@ -225,9 +236,7 @@ class RungeKutta4Stepper:
 
     def _blame(self, state: State, dt: float, end: float) -> str:
         """Whether the step was beyond the limit at the last accepted state."""
-        limit: Limit = self.limits(
-            before(state.time, end), state.displacement, state.velocity, state.pressure
-        )
+        limit = self._limit(state, before(state.time, end))
         if limit.step < dt:
             text = f"the stability limit {limit.step:.3g} s, set by {limit.cause}"
             return f"dt = {dt:.3g} s is beyond {text}"
@@ -240,8 +249,8 @@ class Adaptive:
 
     Parameters
     ----------
-    tolerance : error of a nodal displacement per step, m; that of a velocity is `tolerance` over
-        `time_scale`.
+    tolerance : error of a nodal displacement per step, m, or of the angle of a rigid body, rad;
+        that of a velocity is `tolerance` over `time_scale`.
     time_scale : s.
     rtol : relative tolerance.
     pair : ``"DOP853"`` (order 8) or ``"RK45"`` (order 5, Dormand and Prince).
@@ -282,11 +291,10 @@ class AdaptiveStepper:
 
     def begin(self, state: State) -> State:
         """Find the pressures of a beginning."""
-        displacement, velocity = state.displacement.copy(), state.velocity.copy()
-        self.model.hold(state.time, displacement, velocity)
-        _, pressure = self.acceleration(state.time, displacement, velocity)
+        u, v = self.model.rows(state)
+        _, multipliers = self.acceleration(state.time, u, v)
         self._first = None
-        return State(state.time, displacement, velocity, pressure, state.step)
+        return self.model.state(state.time, u, v, multipliers, state.step)
 
     def segment(self, state: State, end: float) -> Iterator[State]:
         """March to the end of a smooth stretch."""
@@ -297,7 +305,8 @@ class AdaptiveStepper:
             finite = np.isfinite(solver.y).all()
             if solver.status == "failed" or not finite:
                 limits = StabilityLimits(self.acceleration)
-                limit = limits(before(state.time, end), *self._arrays(state))
+                arrays = (*self.model.rows(state), self.model.multipliers(state))
+                limit = limits(before(state.time, end), *arrays)
                 raise lost(
                     self.model, state, solver.step_size or 0.0,
                     f"{message or 'not finite'}; explicit steps are limited to {limit.step:.3g} s "
@@ -307,13 +316,9 @@ class AdaptiveStepper:
             yield state
         self._first = solver.step_size
 
-    @staticmethod
-    def _arrays(state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return state.displacement, state.velocity, state.pressure
-
     def _solver(self, state: State, end: float) -> RK45 | DOP853:
-        free, method = self.model.free, self.method
-        y = np.concatenate([state.displacement[free].ravel(), state.velocity[free].ravel()])
+        model, method = self.model, self.method
+        y = np.concatenate([model.unknowns(rows) for rows in model.rows(state)])
         atol = np.full(len(y), method.tolerance)
         atol[len(y) // 2 :] /= method.time_scale
         kind = {"RK45": RK45, "DOP853": DOP853}[method.pair]
@@ -326,18 +331,18 @@ class AdaptiveStepper:
 
     def _spread(self, time: float, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Displacement and velocity of all nodes from the unknowns of the free ones."""
-        displacement, velocity = np.zeros((2, *self.model.load.shape))
-        displacement[self.model.free], velocity[self.model.free] = y.reshape(2, -1, 3)
+        displacement, velocity = np.zeros((2, *self.model.shape))
+        for values, rows in zip(np.split(y, 2), (displacement, velocity), strict=True):
+            self.model.add_unknowns(values, rows)
         self.model.hold(time, displacement, velocity)
         return displacement, velocity
 
     def _rates(self, time: float, y: FloatArray) -> FloatArray:
         displacement, velocity = self._spread(time, y)
         acceleration, _ = self.acceleration(time, displacement, velocity)
-        free = self.model.free
-        return np.concatenate([velocity[free].ravel(), acceleration[free].ravel()])
+        return np.concatenate([self.model.unknowns(velocity), self.model.unknowns(acceleration)])
 
     def _state(self, solver: RK45 | DOP853, end: float) -> State:
         displacement, velocity = self._spread(solver.t, solver.y)
-        _, pressure = self.acceleration(before(solver.t, end), displacement, velocity)
-        return State(solver.t, displacement, velocity, pressure, solver.step_size)
+        _, multipliers = self.acceleration(before(solver.t, end), displacement, velocity)
+        return self.model.state(solver.t, displacement, velocity, multipliers, solver.step_size)

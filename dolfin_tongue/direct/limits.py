@@ -6,7 +6,10 @@ All eigenvalues s of the motion then have |s| <= (c + sqrt(c^2 + 4 w^2)) / 2. Th
 adds the double eigenvalue -1/tau. Runge-Kutta 4 is stable where |s| dt <= 2.61 anywhere in the left
 half-plane (2.785 on the real axis), so that dt is refused beyond 2.61 / max(|s|, 1/tau).
 
-The radii come from power iterations; each term has its own, which tells the cause.
+The radii come from power iterations; each term has its own, which tells the cause. The unknown
+coordinates of rigid bodies take part, with their springs and dampers as one more term, which sets
+the limit of a light body. Tissue on a body, however light, is not faster than without it: rigid
+motion of its nodes and more mass both lower Rayleigh's quotient. Sliding nodes stay on surfaces.
 """
 
 from __future__ import annotations
@@ -18,9 +21,13 @@ import scipy.sparse as sp
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.constitutive.active import FibreStress
+from dolfin_tongue.direct.border import condensed
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
 from dolfin_tongue.term import SurfaceTerm, Term
+
+#: Time, displacement and velocity (all rows).
+State = tuple[float, FloatArray, FloatArray]
 
 #: Smallest |z| on the boundary of the stability region of Runge-Kutta 4 in the left half-plane.
 RK4_RADIUS = 2.61
@@ -55,7 +62,7 @@ class StabilityLimits:
     def __call__(
         self, time: float, displacement: FloatArray, velocity: FloatArray, pressure: FloatArray
     ) -> Limit:
-        """Limit at a state; the pressures enter through the Hessians of the volumes (101)."""
+        """Limit at a state; the multipliers enter through the Hessians of the constraints (101)."""
         state = (time, displacement, velocity)
         rate = _bound(*self._radii("all", state, pressure, None))
         by_tau = 1.0 / self.acceleration.tau if self.acceleration.tau else 0.0
@@ -66,44 +73,87 @@ class StabilityLimits:
             return Limit(np.inf, "nothing")
         return Limit(RK4_RADIUS / rate, self._cause(state, rate))
 
-    def _cause(self, state: tuple[float, FloatArray, FloatArray], rate: float) -> str:
+    def _cause(self, state: State, rate: float) -> str:
         """Name the term whose own radius is the largest."""
-        terms = [term for term, _ in (*self.model.laws, *self.model.membranes)]
-        parts = [self._radii(i, state, None, (term,)) for i, term in enumerate(terms)]
+        terms: list[Term | None] = [term for term, _ in (*self.model.laws, *self.model.membranes)]
+        if self.acceleration.columns is not None:
+            terms.append(None)  # the loads of the rigid bodies
+        parts = [
+            self._radii(i, state, None, () if term is None else (term,))
+            for i, term in enumerate(terms)
+        ]
         bounds = [_bound(*part) for part in parts]
         worst = int(np.argmax(bounds)) if bounds else 0
         if not bounds or bounds[worst] < 0.3 * rate:
             return f"the pressures of the volume constraint (fastest rate {rate:.3g} 1/s)"
-        return _describe(terms[worst], *parts[worst], rate)
+        term, (c, w) = terms[worst], parts[worst]
+        if term is not None:
+            return _describe(term, c, w, rate)
+        name = self._moved(self._vectors[worst, "damping" if c > w else "stiffness"])
+        return f"springs and dampers of {name} (fastest rate {rate:.3g} 1/s)"
+
+    def _moved(self, vector: FloatArray) -> str:
+        """Name of the rigid body with most of the kinetic energy of a mode."""
+        bodies = self.model.bodies
+        assert bodies is not None
+        energy = np.zeros(bodies.given.size)
+        own = np.diag(bodies.loads.mass(np.zeros(len(energy))))[bodies.unknown]
+        energy[bodies.unknown] = own * vector[3 * len(self.model.free) :] ** 2
+        return bodies.bodies[int(energy.reshape(-1, 3).sum(axis=1).argmax())].name
 
     def _radii(
         self,
         key: object,
-        state: tuple[float, FloatArray, FloatArray],
+        state: State,
         pressure: FloatArray | None,
         terms: tuple[Term, ...] | None,
     ) -> tuple[float, float]:
-        """Radii c, 1/s, and w, 1/s, of some terms."""
-        stiffness = self.model.element_tangents(*state, 1.0, 0.0, terms)
+        """Radii c, 1/s, and w, 1/s, of some terms; of no terms: of the loads of rigid bodies."""
+        model = self.model
+        self.acceleration.turn(state[1])
+        own = self._own(state, pressure, terms)
+        stiffness = model.element_tangents(*state, 1.0, 0.0, terms)
         if pressure is not None:
-            self.model.add_constraint_hessians(state[1], -pressure, stiffness)
-        w2 = self._power((key, "stiffness"), stiffness, state[1])
-        if not self.model.rated:
+            model.add_constraint_hessians(state[1], -pressure, stiffness)
+        w2 = self._power((key, "stiffness"), self._matrix(stiffness, own[0]), state[1])
+        if not (model.rated or np.any(own[1])):
             return 0.0, float(np.sqrt(w2))
-        damping = self.model.element_tangents(*state, 0.0, 1.0, terms)
-        return self._power((key, "damping"), damping, state[1]), float(np.sqrt(w2))
+        damping = model.element_tangents(*state, 0.0, 1.0, terms)
+        c = self._power((key, "damping"), self._matrix(damping, own[1]), state[1])
+        return c, float(np.sqrt(w2))
+
+    def _own(
+        self, state: State, pressure: FloatArray | None, terms: tuple[Term, ...] | None
+    ) -> tuple[FloatArray | float, FloatArray | float]:
+        """Stiffness and damping of the coordinates that do not come from the elements."""
+        model = self.model
+        if model.bodies is None or self.acceleration.columns is None or terms:
+            return 0.0, 0.0
+        force = np.zeros_like(model.load)
+        if pressure is not None:
+            force = model.force(*state)
+            model.add_constraint_force(model.constraint_gradients(state[1]), pressure, force)
+        return model.bodies.tangents(*state, model.whole(force))
+
+    def _matrix(self, matrices: list[FloatArray], own: FloatArray | float) -> sp.csr_array:
+        """Sparse matrix over the unknowns."""
+        matrix, columns = assembled(self.model, matrices), self.acceleration.columns
+        if columns is None:
+            return matrix
+        C, R, E = condensed(self.model, matrices, columns, columns)
+        return sp.block_array([[matrix, C], [R, E + own]], format="csr")
 
     def _power(
-        self, key: tuple[object, str], matrices: list[FloatArray], displacement: FloatArray
+        self, key: tuple[object, str], matrix: sp.csr_array, displacement: FloatArray
     ) -> float:
-        """Spectral radius of Gamma A on volume-keeping motions; starts from the last vector."""
-        matrix = assembled(self.model, matrices)
-        if not matrix.nnz or not np.abs(matrix.data).max() > 0:
-            return 0.0
-        gradients = self.model.volume_gradients(displacement)
+        """Spectral radius of Gamma A on motions that keep the constraints; from the last vector."""
         vector = self._vectors.get(key)
         if vector is None:
             vector = np.random.default_rng(0).standard_normal(matrix.shape[0])
+            self._vectors[key] = vector
+        if not matrix.nnz or not np.abs(matrix.data).max() > 0:
+            return 0.0
+        gradients = self.model.constraint_gradients(displacement)
         radius = 0.0
         for _ in range(200):
             vector = vector / np.linalg.norm(vector)
@@ -115,12 +165,12 @@ class StabilityLimits:
         return 1.02 * radius  # the iteration approaches it from below
 
     def _project(self, force: FloatArray, gradients: list[FloatArray]) -> FloatArray:
-        """Acceleration by a force, with the volumes kept."""
-        free = self.acceleration.solve_mass(force.reshape(-1, 3))
-        full = np.zeros_like(self.model.load)
-        full[self.model.free] = free
+        """Acceleration by a force, with the constraints kept."""
+        free = self.acceleration.solve(force)
+        full = np.zeros(self.model.shape)
+        self.acceleration.add(free, full)
         push, _ = self.acceleration.push(gradients, -self.model.constraint_rate(gradients, full))
-        return (free + push).ravel()
+        return free + push
 
 
 def _bound(c: float, w: float) -> float:

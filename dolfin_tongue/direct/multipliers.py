@@ -22,6 +22,11 @@ relative as in `balance.Drift`; volumes kept to 1e-10 in all cases):
 Held nodes are eliminated: Gamma is the inverse of the free part of the mass; their prescribed
 acceleration enters r and the inertia of their free neighbours.
 
+Sliding nodes (51), (52) are rows of A and G like the cells (`slides`): as for the volumes, (52)
+lacks the inverse mass as printed, and d'Alembert's form has it. Unknown coordinates of rigid bodies
+(61), (62) are further columns of G, and Gamma is the inverse mass of free nodes and coordinates
+(`border.MassBorder`). The printed metric has no meaning for either and refuses them.
+
 How D lambda = r is solved. The lumped mass makes Gamma diagonal and D sparse: cells are coupled
 only if they share a node; D is factored sparsely. Gamma of the consistent mass (40) is dense, and
 so is D. Gamma (per component) is kept as a matrix for up to `DENSE_NODES` free nodes, and D is
@@ -47,8 +52,9 @@ from scipy.sparse.linalg import splu
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.direct import points
+from dolfin_tongue.direct.border import MassBorder, condensed_gradient
 from dolfin_tongue.direct.model import Model
-from dolfin_tongue.errors import OutOfRange, require_positive
+from dolfin_tongue.errors import BadScene, OutOfRange, require_positive
 
 #: Free nodes up to which Gamma is kept as a dense matrix.
 DENSE_NODES = 450
@@ -66,6 +72,10 @@ class Acceleration:
     tau : time constant of the constraints, s; None leaves out the terms in A and A' (then r keeps
         A'' = 0 only: for states that fulfil the constraints already).
     metric : ``"dalembert"`` or ``"report"`` (as printed).
+
+    Raises
+    ------
+    BadScene : the printed metric with sliding nodes or rigid bodies.
     """
 
     def __init__(self, model: Model, tau: float | None, metric: str = "dalembert"):
@@ -73,10 +83,16 @@ class Acceleration:
             require_positive(self, "s", tau=tau)
         if metric not in ("dalembert", "report"):
             raise OutOfRange("constraint_metric", metric, '"dalembert" or "report"')
+        if metric == "report" and (model.slides or model.bodies):
+            raise BadScene(
+                'constraint_metric="report" has no inverse mass in the constraint forces, so that '
+                'it can drive neither rigid bodies nor sliding nodes; take "dalembert"'
+            )
         self.model, self.tau, self.metric = model, tau, metric
         free = model.free
         mass = model.mass[free][:, free]
-        self._mass_to_held = model.mass[free] if model.problem.held.size else None
+        held = model.problem.held.size or model.bodies
+        self._mass_of_held = model.whole_mass if held else None
         self._lumped = np.asarray(model.mass.sum(axis=1)).ravel()[free]
         self.dense = len(free) <= DENSE_NODES
         if model.lumped:
@@ -86,35 +102,61 @@ class Acceleration:
             self.solve_mass = lambda rhs: self._inverse @ rhs
         else:
             self.solve_mass = splu(mass.tocsc()).solve
+        #: `Bodies.columns` at the state of the last `turn`; None where no coordinate is unknown.
+        self.columns: FloatArray | None = None
+        coordinates = model.bodies is not None and model.bodies.unknown.size
+        self._border = MassBorder(model, self.solve_mass) if coordinates else None
         self._preconditioner: Callable[[FloatArray], FloatArray] | None = None
 
     def __call__(
         self, time: float, displacement: FloatArray, velocity: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Acceleration, shape (n, 3), m/s2, and pressure = multipliers, shape (m,), Pa.
+        """Acceleration of all rows, shape (N, 3), m/s2, and multipliers, shape (c,), Pa.
 
         With the printed metric the multipliers are no pressures: the pressures of d'Alembert's form
         are given there too.
         """
         model = self.model
-        force = model.force(time, displacement, velocity)[model.free]
-        acceleration = model.held_acceleration(time)
-        if self._mass_to_held is not None:
-            force -= self._mass_to_held @ acceleration
+        self.turn(displacement)
+        force = model.whole(model.force(time, displacement, velocity))
+        acceleration = model.held_acceleration(time, displacement, velocity)
+        if self._mass_of_held is not None:
+            force -= self._mass_of_held @ acceleration
         change, gradients = model.constraint(displacement)
-        free_motion = self.solve_mass(force)
-        acceleration[model.free] = free_motion
+        force = model.reduced(time, displacement, velocity, acceleration, force)
+        self.add(self.solve(force), acceleration)
         r = -model.constraint_curvature(displacement, velocity)
         r -= model.constraint_rate(gradients, acceleration)
         if self.tau is not None:
             r -= 2 / self.tau * model.constraint_rate(gradients, velocity)
             r -= change / self.tau**2
         push, pressure = self.push(gradients, r)
-        acceleration[model.free] += push
+        self.add(push, acceleration)
         return acceleration, pressure
 
+    def turn(self, displacement: FloatArray) -> None:
+        """Take the position of the rigid bodies, on which the mass of their coordinates depends."""
+        self.columns = self.model.columns(displacement)
+        if self._border is not None and self.columns is not None:
+            self._border.turn(self.columns)
+
+    def solve(self, force: FloatArray) -> FloatArray:
+        """Accelerations of the unknowns by forces on them, shape (d,) or (d, k): Gamma."""
+        if self._border is None:
+            return self.solve_mass(force.reshape(len(self.model.free), -1)).reshape(force.shape)
+        nodal = force[: 3 * len(self.model.free)]
+        free = self.solve_mass(nodal.reshape(len(self.model.free), -1)).reshape(nodal.shape)
+        return self._border.complete(free, force[len(nodal) :])
+
+    def add(self, values: FloatArray, rows: FloatArray) -> None:
+        """Add accelerations of unknowns to an array of all rows, what they carry included."""
+        self.model.add_unknowns(values, rows)
+        if self.columns is not None and self.model.bodies is not None:
+            own = values[3 * len(self.model.free) :]
+            rows[self.model.bodies.rows] += self.columns @ own
+
     def push(self, gradients: list[FloatArray], r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Acceleration of the free nodes, shape (f, 3), that changes A'' by r; the pressures."""
+        """Acceleration of the unknowns, shape (d,), that changes A'' by r; the multipliers."""
         if not np.isfinite(r).all():
             return self._nothing()
         try:
@@ -124,14 +166,14 @@ class Acceleration:
 
     def _nothing(self) -> tuple[FloatArray, FloatArray]:
         """NaN, which the steppers notice."""
-        return np.full((len(self.model.free), 3), np.nan), np.full(self.model.cell_count, np.nan)
+        return np.full(self.model.size, np.nan), np.full(self.model.constraint_count, np.nan)
 
     def _push(self, gradients: list[FloatArray], r: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self.metric == "report":
             G = self.sparse_gradient(gradients)
             multiplier = self._factored((G @ G.T).tocsc())(r)
             pressure = self._dalembert(gradients, r)[1]
-            return (G.T @ multiplier).reshape(-1, 3), pressure
+            return G.T @ multiplier, pressure
         return self._dalembert(gradients, r)
 
     def _dalembert(
@@ -140,7 +182,7 @@ class Acceleration:
         if self.model.lumped:
             G = self.sparse_gradient(gradients)
             pressure = self._factored(self.lumped_D(G))(r)
-            return self.solve_mass((G.T @ pressure).reshape(-1, 3)), pressure
+            return self.solve(G.T @ pressure), pressure
         if self.dense:
             return self._dense_push(gradients, r)
         return self._iterative_push(self.sparse_gradient(gradients), r)
@@ -149,25 +191,23 @@ class Acceleration:
         self, gradients: list[FloatArray], r: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Form Gamma G^T and D, factor D by Cholesky's method."""
-        G = dense_gradient(self.model, gradients)
-        cells, count = len(G), len(self.model.free)
-        by_node = G.reshape(cells, count, 3).transpose(1, 2, 0).reshape(count, -1)
-        spread = (self._inverse @ by_node).reshape(3 * count, cells)
+        G = dense_gradient(self.model, gradients, self.columns)
+        spread = self.solve(G.T)
         factor = la.cho_factor(G @ spread, check_finite=False)
         pressure = la.cho_solve(factor, r, check_finite=False)
-        return (spread @ pressure).reshape(count, 3), pressure
+        return spread @ pressure, pressure
 
     def _iterative_push(self, G: sp.csr_array, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Conjugate gradients on D with the lumped D of an earlier state as preconditioner."""
         precondition = self._preconditioner or self._factored(self.lumped_D(G))
         self._preconditioner = precondition
-        pressure, push = np.zeros_like(r), np.zeros((len(self.model.free), 3))
+        pressure, push = np.zeros_like(r), np.zeros(self.model.size)
         residual = r.copy()
         direction = z = precondition(residual)
         product = residual @ z
         for count in range(200):
-            step = self.solve_mass((G.T @ direction).reshape(-1, 3))
-            image = G @ step.ravel()
+            step = self.solve(G.T @ direction)
+            image = G @ step
             length = product / (direction @ image)
             pressure, push = pressure + length * direction, push + length * step
             residual = residual - length * image
@@ -183,8 +223,12 @@ class Acceleration:
         return push, pressure
 
     def lumped_D(self, G: sp.csr_array) -> sp.csc_array:
-        """G Gamma G^T with the lumped mass."""
-        return ((G * (1.0 / np.repeat(self._lumped, 3))) @ G.T).tocsc()
+        """G Gamma G^T with the lumped mass of the nodes."""
+        if self._border is None:
+            return ((G * (1.0 / np.repeat(self._lumped, 3))) @ G.T).tocsc()
+        nodal, own = G[:, : 3 * len(self.model.free)], G[:, 3 * len(self.model.free) :]
+        D = (nodal * (1.0 / np.repeat(self._lumped, 3))) @ nodal.T
+        return (D + own @ sp.csr_array(self._border.inverse) @ own.T).tocsc()
 
     @staticmethod
     def _factored(D: sp.csc_array) -> Callable[[FloatArray], FloatArray]:
@@ -192,22 +236,33 @@ class Acceleration:
         return splu(D, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
 
     def sparse_gradient(self, gradients: list[FloatArray]) -> sp.csr_array:
-        """G = dA/dU over the free components, shape (m, d), m2."""
+        """G = dA/dU over the unknowns, shape (c, d), m2."""
         rows, columns, values = [], [], []
-        for block, gradient in zip(self.model.blocks, gradients, strict=True):
-            numbers = np.arange(block.numbers.start, block.numbers.stop)
-            rows.append(np.repeat(numbers, 3 * block.cells.shape[1]))
-            columns.append(self.model.dofs[block.cells].ravel())
+        for part, gradient in zip(self.model.constrained, gradients, strict=True):
+            numbers = np.arange(part.numbers.start, part.numbers.stop)
+            rows.append(np.repeat(numbers, 3 * part.cells.shape[1]))
+            columns.append(self.model.dofs[part.cells].ravel())
             values.append(gradient.ravel())
         row, column, value = (np.concatenate(part) for part in (rows, columns, values))
         keep = column >= 0
-        shape = (self.model.cell_count, 3 * len(self.model.free))
-        return sp.coo_array((value[keep], (row[keep], column[keep])), shape=shape).tocsr()
+        shape = (self.model.constraint_count, 3 * len(self.model.free))
+        G = sp.coo_array((value[keep], (row[keep], column[keep])), shape=shape).tocsr()
+        if self.columns is None:
+            return G
+        own = condensed_gradient(self.model, gradients, self.columns)
+        return sp.hstack([G, sp.csr_array(own)], format="csr")
 
 
-def dense_gradient(model: Model, gradients: list[FloatArray]) -> FloatArray:
-    """G = dA/dU over the free components as a dense matrix, shape (m, d), m2."""
-    G = np.zeros((model.cell_count, 3 * len(model.free)))
-    for block, gradient in zip(model.blocks, gradients, strict=True):
-        points.scatter_gradients(gradient, block.cells, model.dofs, G[block.numbers])
-    return G
+def dense_gradient(
+    model: Model, gradients: list[FloatArray], columns: FloatArray | None = None
+) -> FloatArray:
+    """G = dA/dU as a dense matrix, shape (c, d), m2.
+
+    Over the free components; with `Bodies.columns` also over the unknown coordinates.
+    """
+    G = np.zeros((model.constraint_count, 3 * len(model.free)))
+    for part, gradient in zip(model.constrained, gradients, strict=True):
+        points.scatter_gradients(gradient, part.cells, model.dofs, G[part.numbers])
+    if columns is None:
+        return G
+    return np.concatenate([G, condensed_gradient(model, gradients, columns)], axis=1)

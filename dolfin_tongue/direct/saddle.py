@@ -27,7 +27,8 @@ from dolfin_tongue.direct.multipliers import dense_gradient
 #: Unknowns up to which the matrix is dense.
 DENSE_SIZE = 400
 
-#: Maps the right-hand sides (momentum of free components, volumes) to (velocity, multipliers).
+#: Maps the right-hand sides (momentum of free components, constraints) to (velocity, multipliers),
+#: of shapes (3f,) and (c,), or (3f, k) and (c, k).
 Solver = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 
@@ -41,7 +42,7 @@ class Saddle:
 
     def __init__(self, model: Model):
         self.model = model
-        self.free, self.cells = 3 * len(model.free), model.cell_count
+        self.free, self.cells = 3 * len(model.free), model.constraint_count
         self.dense = self.free + self.cells <= DENSE_SIZE
         if not self.dense:
             self._build_pattern()
@@ -90,7 +91,7 @@ class Saddle:
         """Sparsity, and the place of every entry of the element matrices in it."""
         pairs = [_pairs(dofs, dofs) for dofs in self.model.block_dofs]
         gradient_pairs = []
-        for block in self.model.blocks:
+        for block in self.model.constrained:
             dofs = self.model.dofs[block.cells]  # (m, k, 3), like the gradients
             number = np.arange(block.numbers.start, block.numbers.stop) + self.free
             row = np.broadcast_to(number[:, None, None], dofs.shape)

@@ -15,6 +15,7 @@ from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.rigid import plane
 from dolfin_tongue.rigid.body import RigidBody
 from dolfin_tongue.rigid.forces import SKULL, Line, PointForce, RigidForce, Turning
+from dolfin_tongue.rigid.lines import Lines
 
 
 def as_vector(values: FloatArray) -> tuple[float, float, float]:
@@ -38,12 +39,17 @@ class Loads:
         self.bodies, self.count = tuple(bodies), 3 * len(bodies)
         self._places = {body.name: slice(3 * i, 3 * i + 3) for i, body in enumerate(bodies)}
         self._centres = [body.arms(np.asarray(body.centre)) for body in bodies]
+        self._arms = np.concatenate([*self._centres, np.zeros((0, 3))])
+        self._masses = np.array([body.mass for body in bodies])
+        self._inertias = np.array([body.inertia for body in bodies])
         weights = [PointForce(body.centre, as_vector(body.mass * gravity)) for body in bodies]
         self._forces: list[tuple[RigidBody, RigidForce]] = [
             (body, force)
             for body, weight in zip(bodies, weights, strict=True)
             for force in (*body.forces, *([weight] if np.any(gravity) else []))
         ]
+        lines = [(body, force) for body, force in self._forces if isinstance(force, Line)]
+        self._lines = Lines(bodies, lines) if lines else None
 
     # -- inertia -------------------------------------------------------------------------------
 
@@ -66,7 +72,13 @@ class Loads:
 
     def inertia(self, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
         """Inertia force on the coordinates, shape (3b,), N and N m."""
-        return self.mass(q) @ a + self.centrifugal(q, v)
+        q, v, a = (x.reshape(-1, 3) for x in (q, v, a))
+        r, rate, turn = plane.turned(self._arms, q[:, 2]), v[:, 2] ** 2, a[:, 2]
+        force = np.empty_like(q)
+        force[:, 0] = self._masses * (a[:, 0] + turn * r[:, 2] - rate * r[:, 0])
+        force[:, 1] = self._masses * (a[:, 1] - turn * r[:, 0] - rate * r[:, 2])
+        force[:, 2] = self._inertias * turn + r[:, 2] * force[:, 0] - r[:, 0] * force[:, 1]
+        return force.ravel()
 
     def inertia_tangents(
         self, q: FloatArray, v: FloatArray, a: FloatArray
@@ -99,7 +111,19 @@ class Loads:
 
     def force(self, time: float, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the forces on the coordinates, shape (3b,), N and N m."""
-        return self.force_and_tangents(time, q, v)[0]
+        out = self._lines.force(time, q, v) if self._lines else np.zeros(self.count)
+        for body, force in self._forces:
+            at = self._places[body.name]
+            if isinstance(force, PointForce):
+                push, r = force.at(time), plane.turned(self._point(body, force), q[at][2])[0]
+                out[at] += (push[0], push[2], r[2] * push[0] - r[0] * push[2])
+            elif isinstance(force, Turning):
+                out[at] += force.generalised(time, q[at], v[at])[0]
+        return out
+
+    def _point(self, body: RigidBody, force: PointForce) -> FloatArray:
+        """Arm of a force, shape (1, 3), m."""
+        return body.arms(np.asarray(force.point))
 
     def force_and_tangents(
         self, time: float, q: FloatArray, v: FloatArray
@@ -129,7 +153,7 @@ class Loads:
         q: FloatArray,
         out: tuple[FloatArray, FloatArray, FloatArray],
     ) -> None:
-        at, arm, value = self._places[body.name], body.arms(np.asarray(force.point)), force.at(time)
+        at, arm, value = self._places[body.name], self._point(body, force), force.at(time)
         out[0][at] += plane.jacobian(arm, q[at])[0].T @ value
         out[1][at.start + 2, at.start + 2] += plane.bend(arm, q[at])[0] @ value
 

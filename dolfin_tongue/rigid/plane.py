@@ -14,21 +14,27 @@ import numpy as np
 from dolfin_tongue.arrays import FloatArray
 
 
-def turned(arms: FloatArray, angle: float) -> FloatArray:
-    """Arms (k, 3), m, after a rotation."""
+def turned(arms: FloatArray, angle: float | FloatArray) -> FloatArray:
+    """Arms (k, 3), m, after a rotation; one angle, or one for each arm."""
     c, s = np.cos(angle), np.sin(angle)
-    x, y, z = arms.T
-    return np.stack([c * x + s * z, y, c * z - s * x], axis=1)
+    result = np.empty_like(arms)
+    result[:, 0] = c * arms[:, 0] + s * arms[:, 2]
+    result[:, 1] = arms[:, 1]
+    result[:, 2] = c * arms[:, 2] - s * arms[:, 0]
+    return result
 
 
 def displacement(arms: FloatArray, q: FloatArray) -> FloatArray:
-    """Displacement of body-fixed points, shape (k, 3), m."""
-    return turned(arms, q[2]) - arms + [q[0], 0.0, q[1]]
+    """Displacement of body-fixed points, shape (k, 3), m; q of shape (3,), or (k, 3)."""
+    moved = turned(arms, q[..., 2]) - arms
+    moved[:, 0] += q[..., 0]
+    moved[:, 2] += q[..., 1]
+    return moved
 
 
 def jacobian(arms: FloatArray, q: FloatArray) -> FloatArray:
-    """T = d(displacement)/dq, shape (k, 3, 3): component, then coordinate."""
-    r = turned(arms, q[2])
+    """T = d(displacement)/dq, shape (k, 3, 3): component, then coordinate; q as above."""
+    r = turned(arms, q[..., 2])
     T = np.zeros((len(arms), 3, 3))
     T[:, 0, 0] = T[:, 2, 1] = 1.0
     T[:, 0, 2], T[:, 2, 2] = r[:, 2], -r[:, 0]
@@ -36,6 +42,6 @@ def jacobian(arms: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def bend(arms: FloatArray, q: FloatArray) -> FloatArray:
-    """d2(displacement)/d(angle)2, the only second derivative, shape (k, 3), m."""
-    r = turned(arms, q[2])
+    """d2(displacement)/d(angle)2, the only second derivative, shape (k, 3), m; q as above."""
+    r = turned(arms, q[..., 2])
     return -r * [1.0, 0.0, 1.0]

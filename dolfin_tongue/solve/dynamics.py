@@ -45,13 +45,8 @@ METHODS: dict[str, dict[str, float]] = {
 
 
 #: Reasons to refuse a step that Newton's method solved, beside those of PETSc: its end has an
-#: inverted cell, or has passed an obstacle.
-INVERTED, PENETRATED = -1000, -1001
-
-
-def _name(reason: int) -> str:
-    names = {INVERTED: "INVERTED_CELL", PENETRATED: "PENETRATION"}
-    return names.get(reason) or reason_name(reason)
+#: inverted cell, or is refused by contact.
+INVERTED, REFUSED = -1000, -1001
 
 
 @dataclass(frozen=True)
@@ -124,6 +119,7 @@ class Dynamics:
         self.steps = steps or TimeSteps()
         self._velocity_before: FloatArray | None = None
         self._multipliers_before: FloatArray | None = None
+        self._refusal = ""
         self._multipliers = np.zeros(len(self.system.multiplier_dofs))
         self._connect()
 
@@ -284,7 +280,7 @@ class Dynamics:
             if not dt >= self.steps.step_limits[0]:
                 body = self.system.scene.body
                 raise NotConverged(
-                    _name(reason), state.time, where_and_why(body, state.displacement)
+                    self._name(reason), state.time, where_and_why(body, state.displacement)
                 )
             if reason == Reason.DIVERGED_LINEAR_SOLVE:
                 self._connect()
@@ -315,8 +311,16 @@ class Dynamics:
         if not (gauss_jacobians(body.points + displacement, body.cells) > 0).all():
             return INVERTED
         time, before = self.ts.getTime(), self._begin[0]
-        refused = any(part.refusal(time, y, before) for part in self.system.couplings)
-        return PENETRATED if refused else reason
+        for part in self.system.couplings:
+            if refusal := part.refusal(time, y, before):
+                self._refusal = refusal
+                return REFUSED
+        return reason
+
+    def _name(self, reason: int) -> str:
+        """Words for a reason."""
+        names = {INVERTED: "INVERTED_CELL", REFUSED: self._refusal}
+        return names.get(reason) or reason_name(reason)
 
     def _cut(self, dt: float, error: float | None) -> float:
         """Smaller step after a failure (a quarter) or after too large an error."""

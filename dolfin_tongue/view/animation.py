@@ -22,10 +22,12 @@ from dolfin_tongue.view.canvas import (
     milliseconds,
 )
 from dolfin_tongue.view.film import Film
+from dolfin_tongue.view.scene3d import Colour
+from dolfin_tongue.view.surroundings import Surroundings
 
 #: Width of the animation, pixels.
 WIDTH = 480
-#: Colours of the palette, which all frames share.
+#: Colours of the palette, which all frames share, without those of walls and bones.
 COLOURS = 56
 
 
@@ -37,6 +39,7 @@ def animation(
     *,
     fixed: Sequence[str] = (),
     outline: bool = True,
+    surroundings: Surroundings | None = None,
 ) -> Path:
     """Write a GIF of a movement, seen as in `contact_sheet`, which repeats for ever.
 
@@ -48,6 +51,7 @@ def animation(
     fps : frames per second, in (0, 50]. The format rounds a frame's duration to 10 ms.
     fixed : regions whose nodes are marked.
     outline : whether the outline of the body at rest is drawn, faintly.
+    surroundings : walls and bones; see `Surroundings.of`.
 
     Returns
     -------
@@ -61,8 +65,9 @@ def animation(
     """
     if not 0 < fps <= 50:
         raise OutOfRange("fps", fps, "in (0, 50]", "1/s")
-    with Film(body, states, WIDTH, fixed=fixed, outline=outline) as film:
-        palette = _palette([_picture(film, states[k]) for k in _samples(len(states))])
+    with Film(body, states, WIDTH, fixed=fixed, outline=outline, surroundings=surroundings) as film:
+        samples = [_picture(film, states[k]) for k in _samples(len(states))]
+        palette = _palette(samples, film.near.inks)
         frames = (
             _picture(film, s).quantize(palette=palette, dither=Image.Dither.NONE) for s in states
         )
@@ -89,12 +94,15 @@ def _samples(count: int) -> list[int]:
     return np.unique(np.linspace(0, count - 1, 6).round().astype(int)).tolist()
 
 
-def _palette(pictures: Sequence[Image.Image]) -> Image.Image:
-    """Palette for all frames: one of its own for each would make still parts flicker."""
+def _palette(pictures: Sequence[Image.Image], inks: Sequence[Colour]) -> Image.Image:
+    """Palette for all frames: one of its own for each would make still parts flicker.
+
+    `inks` are colours of lines that it has to have.
+    """
     together = np.concatenate([np.asarray(picture) for picture in pictures])
     # Lines, and the greys of their soft edges, have too few pixels to get colours by themselves.
-    kept = (WHITE, INK, FAINT, WHISKER, (196, 196, 202), (150, 150, 158))
-    shades = Image.fromarray(together).quantize(COLOURS - len(kept)).getpalette() or []
+    kept = (WHITE, INK, FAINT, WHISKER, (196, 196, 202), (150, 150, 158), *inks)
+    shades = Image.fromarray(together).quantize(COLOURS + len(inks) - len(kept)).getpalette() or []
     palette = Image.new("P", (1, 1))
     palette.putpalette([value for colour in kept for value in colour] + shades)
     return palette

@@ -41,6 +41,8 @@ class View:
 SIDE = View(azimuth=18.0, elevation=10.0)
 #: From the front, the side and above: a single picture, fibres across the tongue.
 OBLIQUE = View(azimuth=38.0, elevation=22.0)
+#: From above: what touches the palate.
+ABOVE = View(azimuth=10.0, elevation=70.0)
 
 
 @dataclass(frozen=True)

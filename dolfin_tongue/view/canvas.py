@@ -137,6 +137,7 @@ def sheet_of(
     columns: int,
     title: str = "",
     bars: Sequence[Bar] = (),
+    least: int = 0,
 ) -> Image.Image:
     """Arrange tiles of equal size in rows, with captions under them.
 
@@ -146,6 +147,7 @@ def sheet_of(
     columns : tiles in a row; fewer if there are fewer.
     title : above all; none if empty.
     bars : scales for the foot of the sheet.
+    least : width of the sheet, pixels.
     """
     width, height = tiles[0].size
     columns = min(columns, len(tiles))
@@ -156,7 +158,7 @@ def sheet_of(
     sheet = Image.new(
         "RGB",
         (
-            columns * (width + gap) + gap,
+            max(columns * (width + gap) + gap, least),
             top + rows * (height + foot) + (round(2.4 * size) if bars else gap // 2),
         ),
         WHITE,

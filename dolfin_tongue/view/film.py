@@ -23,8 +23,9 @@ from dolfin_tongue.view.canvas import (
     nice_below,
     silhouette,
 )
-from dolfin_tongue.view.scene3d import OVERSAMPLING, Pixels, Stage
+from dolfin_tongue.view.scene3d import EDGES, OVERSAMPLING, Colour, Pixels, Stage
 from dolfin_tongue.view.surface import Surface
+from dolfin_tongue.view.surroundings import Neighbourhood, Surroundings
 
 #: Length of the velocity line of a fast node over the length of the body.
 WHISKER_SHARE = 0.14
@@ -70,6 +71,9 @@ class Film:
     fixed : regions whose nodes are marked where they are seen.
     outline : whether the outline of the body at rest is drawn, faintly.
     whiskers : whether velocities of the nodes are drawn as lines.
+    surroundings : walls and bones, if there are any.
+    cuts : see `Surface`.
+    edges : colour of the element edges, 0-255.
     """
 
     def __init__(
@@ -82,18 +86,25 @@ class Film:
         fixed: Sequence[str] = (),
         outline: bool = True,
         whiskers: bool = True,
+        surroundings: Surroundings | None = None,
+        cuts: int = 3,
+        edges: Colour = EDGES,
     ):
         check_states(body, states)
         self.body = body
         self.fixed: IntArray = np.unique(np.concatenate([[], *map(body.nodes, fixed)]).astype(int))
-        self.surface = Surface(body)
+        self.surface = Surface(body, cuts)
         self.stretch = whisker_time(body, states) if whiskers else 0.0
         clouds = [body.points] if outline else []
         for state in states:
             moved = body.points + state.displacement
             clouds += [moved, (moved + self.stretch * state.velocity)[self.surface.nodes]]
+        self.near = surroundings.near(body, states) if surroundings else Neighbourhood()
+        clouds += self.near.clouds(states)
         self.camera = Camera.fitting(clouds, OVERSAMPLING * width, view, margin=0.04)
-        self.stage = Stage(body, self.camera, surface=self.surface)
+        self.stage = Stage(
+            body, self.camera, surface=self.surface, edge_colour=edges, sheets=self.near.sheets
+        )
         self._outline: Image.Image | None = None
         if outline:
             mask = silhouette(self.stage.frame(body.points), OVERSAMPLING)
@@ -137,9 +148,10 @@ class Film:
         colours : ndarray, shape (points of the surface, 3) -- see `Surface.of_cells`.
         """
         points = self.body.points + state.displacement
-        image = Image.fromarray(self.stage.frame(points, colours))
+        image = Image.fromarray(self.stage.frame(points, colours, self.near.shifts(state.time)))
         if self._outline is not None:
             image.paste(FAINT, mask=self._outline)
+        image = self.near.draw(image, self.camera, state)
         draw = ImageDraw.Draw(image)
         seen = np.zeros(len(points), dtype=bool)
         nodes = self.surface.nodes

@@ -18,8 +18,10 @@ from dolfin_tongue.view.fibres import fibre_segments, muscle_colour, see_through
 from dolfin_tongue.view.fields import largest_stretch
 from dolfin_tongue.view.film import check_states
 from dolfin_tongue.view.scene3d import EDGES, OVERSAMPLING, Pixels, Stage
+from dolfin_tongue.view.surroundings import Neighbourhood, Surroundings
 
-_FIELD_EDGES = (90, 90, 96)
+#: Element edges on a field of colours.
+FIELD_EDGES = (90, 90, 96)
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ def shape_picture(
     muscles: Sequence[str] = (),
     view: View = OBLIQUE,
     width: int = 1200,
+    surroundings: Surroundings | None = None,
 ) -> Path:
     """Draw one deformed shape, large.
 
@@ -96,6 +99,7 @@ def shape_picture(
     muscles : their fibres are drawn, deformed, in a body that one can look through.
     view : direction of sight; the tip of the tongue is to the left.
     width : pixels.
+    surroundings : walls and bones; see `Surroundings.of`.
 
     Returns
     -------
@@ -111,7 +115,8 @@ def shape_picture(
     if colour != "tissue" and colour not in SCALES:
         raise UnknownName("colour", colour, ["tissue", *SCALES])
     points = body.points + state.displacement
-    camera = Camera.fitting([points], OVERSAMPLING * width, view)
+    near = surroundings.near(body, [state]) if surroundings else Neighbourhood()
+    camera = Camera.fitting([points, *near.clouds([state])], OVERSAMPLING * width, view)
     bundles = [
         (
             fibre_segments(body, body.fibres[name], state.displacement),
@@ -119,14 +124,15 @@ def shape_picture(
         )
         for name in muscles
     ]
-    edges = EDGES if colour == "tissue" else _FIELD_EDGES
-    with Stage(body, camera, edge_colour=edges, edge_width=2.6) as stage:
+    edges = EDGES if colour == "tissue" else FIELD_EDGES
+    with Stage(body, camera, edge_colour=edges, edge_width=2.6, sheets=near.sheets) as stage:
         colours = None if colour == "tissue" else _colours(stage, SCALES[colour], state)
-        frame = stage.frame(points, colours)
-        image = Image.fromarray(frame).reduce(OVERSAMPLING)
+        frame = stage.frame(points, colours, near.shifts(state.time))
+        image = near.draw(Image.fromarray(frame), camera, state).reduce(OVERSAMPLING)
         if bundles:
+            alone = stage.frame(points) if near.sheets else frame
             rods = stage.rods(bundles, 4.5 / camera.scale)
-            image = see_through(frame, rods, 0.55, silhouette(frame, OVERSAMPLING))
+            image = see_through(frame, rods, 0.55, silhouette(alone, OVERSAMPLING))
     foot = width // 14
     whole = Image.new("RGB", (image.width, image.height + foot), "white")
     whole.paste(image)
@@ -153,9 +159,31 @@ def _draw_legend(
         return
     scale = SCALES[colour]
     limits = scale.limits(scale.values(body, state))
-    length = image.width // 4
+    place = (image.width - 2 * size, level)
+    draw_colour_bar(image, scale, limits, place, size, image.width // 4)
+
+
+def draw_colour_bar(
+    image: Image.Image,
+    scale: Scale,
+    limits: tuple[float, float],
+    place: tuple[int, int],
+    size: int,
+    length: int,
+) -> None:
+    """Draw what the colours of a field mean.
+
+    Parameters
+    ----------
+    image : is drawn on.
+    scale : of the field.
+    limits : lowest and highest value.
+    place : right end and height of the middle, pixels.
+    size : height of the text, pixels.
+    length : of the bar without its text, pixels.
+    """
     strip = scale.paint(np.linspace(*limits, length), limits)
-    draw, right = ImageDraw.Draw(image), image.width - 2 * size
+    draw, (right, level) = ImageDraw.Draw(image), place
     low, high = (f"{limit:.3g}" for limit in limits)
     draw.text((right, level), high, INK, font(size), anchor="rm")
     right -= round(draw.textlength(high, font(size)) + size / 2)

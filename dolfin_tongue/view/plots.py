@@ -1,4 +1,4 @@
-"""Curves over time: landmarks, energies."""
+"""Curves over time: landmarks, energies, contact, rigid bodies."""
 
 from __future__ import annotations
 
@@ -168,3 +168,112 @@ def _draw_balance(
         share = np.abs(balance).max() / exchanged[-1]
         title += f" (largest: {share:.1e} of the energy exchanged)"
     axes.set(ylabel="µJ", title=title)
+
+
+def contact_plot(columns: Mapping[str, ArrayLike], path: Path | str) -> Path:
+    """Draw resultant, area and largest pressure of each contact over time.
+
+    Parameters
+    ----------
+    columns : each of shape (k,). ``time_s``, s; for each contact, e.g. ``contact``, the columns
+        ``contact_area_m2``, ``contact_force_x_N``, ``_y_N``, ``_z_N`` (on the tissue) and, where
+        there is one, ``contact_pressure_Pa``.
+    path : of the image; its suffix tells the format.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    ValueError : no column of times, no contacts.
+    """
+    table = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+    names = contact_names(table)
+    if "time_s" not in table or not names:
+        raise ValueError(
+            f"need a column time_s and contacts (_area_m2, _force_x_N), not {', '.join(columns)}"
+        )
+    time = 1e3 * table["time_s"]
+    pressed = any(f"{name}_pressure_Pa" in table for name in names)
+    with style():
+        figure = new_figure(9, 7.2 if pressed else 5.4)
+        axes = figure.subplots(3 if pressed else 2, 1, sharex=True)
+        for number, name in enumerate(names):
+            colour, label = COLOURS[number % len(COLOURS)], name.replace("_", " ")
+            force = np.array([table[f"{name}_force_{axis}_N"] for axis in "xyz"])
+            axes[0].plot(time, np.linalg.norm(force, axis=0), color=colour, label=label)
+            for part, dashes, way in ((0, ":", "backward"), (2, "--", "upward")):
+                axes[0].plot(
+                    time, force[part], dashes, color=colour, lw=1.2, label=f"{label}, {way}"
+                )
+            axes[1].plot(time, 1e6 * table[f"{name}_area_m2"], color=colour)
+            if f"{name}_pressure_Pa" in table:
+                axes[2].plot(time, 1e-3 * table[f"{name}_pressure_Pa"], color=colour)
+        axes[0].axhline(0.0, color="#55555c", lw=0.8)
+        axes[0].set(ylabel="N", title="Force of contact on the tissue: its size and its parts")
+        axes[0].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes[1].set(ylabel="mm²", title="Area in contact")
+        if pressed:
+            axes[2].set(ylabel="kPa", title="Largest pressure")
+        axes[-1].set_xlabel("time, ms")
+        return save_figure(figure, path)
+
+
+def contact_names(columns: Mapping[str, Any]) -> list[str]:
+    """Contacts that have columns of area and force."""
+    found = [name[: -len("_area_m2")] for name in columns if name.endswith("_area_m2")]
+    return [name for name in found if all(f"{name}_force_{a}_N" in columns for a in "xyz")]
+
+
+def rigid_plot(columns: Mapping[str, ArrayLike], path: Path | str) -> Path:
+    """Draw the coordinates of rigid bodies over time.
+
+    Parameters
+    ----------
+    columns : each of shape (k,). ``time_s``, s; for each body, e.g. ``mandible``, the columns
+        ``mandible_x_m``, ``mandible_z_m`` and ``mandible_angle_rad``; others are left out.
+    path : of the image; its suffix tells the format.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    ValueError : no column of times, no rigid bodies.
+    """
+    table = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+    names = rigid_names(table)
+    if "time_s" not in table or not names:
+        raise ValueError(
+            f"need a column time_s and rigid bodies (_x_m, _z_m, _angle_rad), not "
+            f"{', '.join(columns)}"
+        )
+    parts = (
+        ("angle_rad", 180 / np.pi, "degrees", "Rotation (negative: what lies in front sinks)"),
+        ("x_m", 1e3, "mm", "Displacement backward"),
+        ("z_m", 1e3, "mm", "Displacement upward"),
+    )
+    with style():
+        figure = new_figure(9, 7.2)
+        axes = figure.subplots(3, 1, sharex=True)
+        for place, (ending, factor, unit, title) in zip(axes, parts, strict=True):
+            for number, name in enumerate(names):
+                place.plot(
+                    1e3 * table["time_s"], factor * table[f"{name}_{ending}"],
+                    color=COLOURS[number % len(COLOURS)], label=name.replace("_", " "),
+                )  # fmt: skip
+            place.axhline(0.0, color="#55555c", lw=0.8)
+            place.set(ylabel=unit, title=title)
+        axes[0].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes[-1].set_xlabel("time, ms")
+        return save_figure(figure, path)
+
+
+def rigid_names(columns: Mapping[str, Any]) -> list[str]:
+    """Rigid bodies that have columns of their three coordinates."""
+    found = [name[: -len("_angle_rad")] for name in columns if name.endswith("_angle_rad")]
+    return [name for name in found if f"{name}_x_m" in columns and f"{name}_z_m" in columns]

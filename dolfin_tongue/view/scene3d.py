@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from dolfin_tongue.view.camera import Camera
 from dolfin_tongue.view.display import ensure_display
 from dolfin_tongue.view.surface import Surface
 
+if TYPE_CHECKING:
+    from dolfin_tongue.view.surroundings import Sheet
+
 #: Pictures are drawn so many times larger and then shrunk: smooth lines without multisampling.
 OVERSAMPLING = 2
 
@@ -23,6 +26,11 @@ EDGES = (140, 62, 60)
 
 #: Lights as the camera sees them (right, up, towards it): place and strength.
 LIGHTS = (((-0.5, 1.2, 1.2), 0.7), ((1.5, 0.2, 1.0), 0.3), ((0.0, -0.3, 1.0), 0.22))
+
+#: Opacity of a wall that turns its free side away from the viewer, and towards it; in between, for
+#: the cosine of the angle to the line of sight in this range.
+VEIL, SOLID = 0.16, 0.8
+FACING = (-0.3, 0.35)
 
 Pixels = npt.NDArray[np.uint8]
 Colour = tuple[int, int, int]
@@ -38,6 +46,7 @@ class Stage:
     surface : the surface of the body, if there is one already.
     edge_colour : of the element edges, 0-255.
     edge_width : rendered pixels.
+    sheets : parts of walls that are drawn with the body.
     """
 
     def __init__(
@@ -48,6 +57,7 @@ class Stage:
         surface: Surface | None = None,
         edge_colour: Colour = EDGES,
         edge_width: float = 1.6,
+        sheets: Sequence[Sheet] = (),
     ):
         ensure_display()
         import pyvista
@@ -63,6 +73,7 @@ class Stage:
         self._aim()
         self._skin = self._add_skin()
         self._wires = self._add_wires(edge_colour, edge_width)
+        self._walls = [self._add_wall(sheet) + self._add_section(sheet) for sheet in sheets]
 
     def __enter__(self) -> Stage:
         """Return the stage itself."""
@@ -119,13 +130,58 @@ class Stage:
         )  # fmt: skip
         return mesh
 
-    def frame(self, points: FloatArray, colours: Pixels | None = None) -> Pixels:
+    def _add_wall(self, sheet: Sheet) -> list[Any]:
+        """Add a translucent wall, the fainter the more it turns its free side away."""
+        import pyvista
+
+        toward = self.camera.view.axes[2]
+        # Translucent triangles have to be drawn from back to front; no shift changes their order.
+        order = np.argsort(sheet.points[sheet.triangles].mean(axis=1) @ toward)
+        faces = np.insert(sheet.triangles[order], 0, 3, axis=1)
+        mesh: Any = pyvista.PolyData(sheet.points, faces)
+        share = np.clip((sheet.normals @ toward - FACING[0]) / (FACING[1] - FACING[0]), 0, 1)
+        share = share**2 * (3 - 2 * share)
+        colours = np.empty((len(sheet.points), 4), np.uint8)
+        colours[:, :3] = sheet.colour
+        colours[:, 3] = np.round(255 * (VEIL + share * (SOLID - VEIL)))
+        mesh.point_data["colour"] = colours
+        mesh.point_data.active_normals = sheet.normals
+        actor = self.plotter.add_mesh(
+            mesh, scalars="colour", rgba=True, ambient=0.7, diffuse=0.35, specular=0.1,
+            specular_power=18, interpolation="Phong", copy_mesh=False, reset_camera=False,
+            show_scalar_bar=False,
+        )  # fmt: skip
+        return [actor]
+
+    def _add_section(self, sheet: Sheet) -> list[Any]:
+        """Add the line of a wall in the midsagittal plane, if it comes there."""
+        import pyvista
+
+        segments = sheet.section
+        if not len(segments):
+            return []
+        lines = np.insert(np.arange(2 * len(segments)).reshape(-1, 2), 0, 2, axis=1)
+        mesh = pyvista.PolyData(segments.reshape(-1, 3), lines=lines)
+        actor = self.plotter.add_mesh(
+            mesh, color=[c / 255 for c in sheet.ink], lighting=False,
+            line_width=max(3.0, self.camera.size[0] / 260), reset_camera=False,
+        )  # fmt: skip
+        return [actor]
+
+    def frame(
+        self,
+        points: FloatArray,
+        colours: Pixels | None = None,
+        shifts: FloatArray | None = None,
+    ) -> Pixels:
         """Draw the body with its nodes elsewhere.
 
         Parameters
         ----------
         points : ndarray, shape (n, 3), m -- nodes of the deformed body.
         colours : ndarray, shape (points of the surface, 3) -- see `Surface.of_cells`.
+        shifts : ndarray, shape (s, 3), m -- translations of the walls; without them no wall is
+            drawn.
 
         Returns
         -------
@@ -139,6 +195,10 @@ class Stage:
         # A hair's breadth towards the viewer, so that the surface does not hide its own edges.
         lift = 1.5 / self.camera.scale
         self._wires.points = points + lift * self.camera.view.axes[2]
+        for number, actors in enumerate(self._walls):
+            for actor in actors:
+                actor.visibility = shifts is not None
+                actor.position = (0, 0, 0) if shifts is None else shifts[number]
         return self._grab()
 
     def rods(self, bundles: Sequence[tuple[FloatArray, Colour]], radius: float) -> Pixels:
@@ -152,6 +212,8 @@ class Stage:
         import pyvista
 
         body = [self.plotter.actors[name] for name in ("skin", "wires")]
+        walls = [actor for actors in self._walls for actor in actors]
+        hidden = [actor for actor in (*body, *walls) if actor.visibility]
         rods = []
         for segments, colour in bundles:
             lines = np.insert(np.arange(2 * len(segments)).reshape(-1, 2), 0, 2, axis=1)
@@ -165,10 +227,10 @@ class Stage:
                     reset_camera=False,
                 )
             )
-        for actor in body:
+        for actor in hidden:
             actor.visibility = False
         pixels = self._grab()
-        for actor in body:
+        for actor in hidden:
             actor.visibility = True
         self.plotter.remove_actor(rods)
         return pixels

@@ -11,6 +11,7 @@ from dolfin_tongue.body import Body
 from dolfin_tongue.state import State
 from dolfin_tongue.view.canvas import milliseconds, save_image, sheet_of, spoken
 from dolfin_tongue.view.film import Film
+from dolfin_tongue.view.surroundings import Surroundings
 
 #: Width of one picture in a sheet, pixels.
 TILE_WIDTH = 320
@@ -26,6 +27,7 @@ def contact_sheet(
     captions: Sequence[str] | None = None,
     fixed: Sequence[str] = (),
     outline: bool = True,
+    surroundings: Surroundings | None = None,
 ) -> Path:
     """Draw frames of a movement in the manner of the report's figures 27-31.
 
@@ -42,6 +44,7 @@ def contact_sheet(
     captions : one for each state, instead of its time.
     fixed : regions whose nodes are marked.
     outline : whether the outline of the body at rest is drawn, faintly.
+    surroundings : walls and bones; see `Surroundings.of`.
 
     Returns
     -------
@@ -57,7 +60,9 @@ def contact_sheet(
         raise ValueError(f"columns = {columns}: a sheet needs at least one")
     if captions is not None and len(captions) != len(states):
         raise ValueError(f"{len(captions)} captions for {len(states)} states: give one for each")
-    with Film(body, states, TILE_WIDTH, fixed=fixed, outline=outline) as film:
+    with Film(
+        body, states, TILE_WIDTH, fixed=fixed, outline=outline, surroundings=surroundings
+    ) as film:
         tiles = [film.draw(state) for state in states]
         bars = film.bars
     texts = captions or [milliseconds(state.time) for state in states]
@@ -102,6 +107,7 @@ def final_shapes(
     columns: int = 4,
     title: str = "",
     fixed: Sequence[str] = (),
+    surroundings: Surroundings | None = None,
 ) -> Path:
     """Draw one shape per name over the faint outline of the body at rest.
 
@@ -109,7 +115,7 @@ def final_shapes(
     ----------
     body : the body.
     named_states : name, e.g. of the muscle that was active -> its last state.
-    path, columns, title, fixed : see `contact_sheet`.
+    path, columns, title, fixed, surroundings : see `contact_sheet`.
 
     Returns
     -------
@@ -117,7 +123,9 @@ def final_shapes(
         `path`.
     """
     states = list(named_states.values())
-    with Film(body, states, TILE_WIDTH, fixed=fixed, whiskers=False) as film:
+    with Film(
+        body, states, TILE_WIDTH, fixed=fixed, whiskers=False, surroundings=surroundings
+    ) as film:
         tiles = [film.draw(state) for state in states]
         bars = film.bars
     texts = [spoken(name) for name in named_states]

@@ -1,0 +1,42 @@
+"""The report's tongue is pressed to the palate by posterior genioglossus and styloglossus.
+
+Both muscles rise within 300 ms. The gap between tongue and palate closes from the sides of the
+dorsum, the patch in contact grows, and neither comes through the other.
+"""
+
+from dolfin_tongue.control import SmoothRamp
+from dolfin_tongue.demo import Options, progress_bar
+from dolfin_tongue.pictures import picture_run, read_table
+from dolfin_tongue.run import simulate
+from dolfin_tongue.scenes import report_mouth
+
+END = 0.5
+LEVELS = {"genioglossus_posterior": 1.0, "styloglossus": 0.6}
+
+
+def main(options: Options) -> dict[str, object]:
+    """Run the demo; returns the numbers worth printing."""
+    activation = {name: SmoothRamp(level, 0.0, 0.3) for name, level in LEVELS.items()}
+    scene = report_mouth(activation, ("palate",), options.refinement)
+    print(f"tongue of {len(scene.body.cells)} elements under a palate")
+    with progress_bar("simulated", END) as progress:
+        run = simulate(
+            scene, END, options.folder, options.steps(2.5e-3),
+            resume=options.resume, progress=progress,
+        )  # fmt: skip
+    if options.pictures:
+        picture_run(run, "pressed to the palate by genioglossus posterior and styloglossus")
+    steps = read_table(options.folder / "steps.csv")
+    area = steps["contact_area_m2"]
+    touched = steps["time_s"][area > 0]
+    return {
+        "first contact, s": float(touched[0]) if touched.size else "none",
+        "area in contact at the end, mm2": 1e6 * float(area[-1]),
+        "force of the palate (x, y, z), N": " ".join(
+            f"{steps[f'contact_force_{axis}_N'][-1]:.3f}" for axis in "xyz"
+        ),
+        "largest pressure at the end, kPa": 1e-3 * float(steps["contact_pressure_Pa"][-1]),
+        "smallest gap of all steps, mm": 1e3 * float(steps["contact_gap_m"].min()),
+        "largest relative volume change of a cell": run.summary["max_volume_change"],
+        "simulated seconds per wall second": run.summary["simulated_seconds_per_wall_second"],
+    }

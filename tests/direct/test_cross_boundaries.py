@@ -1,0 +1,101 @@
+"""Sliding, contact and rigid bodies in both solvers: equal forces, and motions that converge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cases import relative
+
+from benchmarks.extremes.proofs import hinged_bone
+from dolfin_tongue.boundary import Gravity, Sliding, moved_onto
+from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
+from dolfin_tongue.control import Constant
+from dolfin_tongue.direct import Direct, Implicit, Model, problem_of
+from dolfin_tongue.geometry.simple import block_body
+from dolfin_tongue.rigid import AngularSpring, LineMuscle, RigidBody
+from dolfin_tongue.scene import Scene
+from dolfin_tongue.state import State
+from dolfin_tongue.study import orders
+from dolfin_tongue.surfaces import Sphere
+
+pytest.importorskip("dolfinx")
+
+BOWL = Sphere((0.015, 0.01, 0.1), 0.1, inside=True)
+
+
+def carried_block() -> Scene:
+    """A block between two bones, whose underside slides on a bowl."""
+    body = block_body((0.03, 0.02, 0.02), (3, 2, 2))
+    bones = np.concatenate([body.nodes("x0"), body.nodes("x1")])
+    under = np.setdiff1d(body.nodes("z0"), bones)
+    body = replace(body, node_sets={**body.node_sets, "under": under})
+    body = moved_onto(body, BOWL, "under")
+    pull = LineMuscle(
+        (-0.01, 0.01, 0.02), (0.04, 0.01, 0.0), to="right", max_force=2.0, activation=Constant(0.4)
+    )
+    left = RigidBody("left", ("x0",), 0.05, 1e-5, (-0.01, 0.01, 0.015), (pull, AngularSpring(0.1)))
+    right = RigidBody("right", ("x1",), 0.02, 4e-6, (0.04, 0.01, 0.01), pivot=(0.05, 0.01, 0.05))
+    terms = (MooneyRivlin(), Viscosity(30.0), Gravity())
+    return Scene(body, terms, (Sliding(BOWL, "under"), left, right))
+
+
+def random_state(scene: Scene, seed: int) -> State:
+    """Random displacements, velocities, pressures, coordinates and multipliers."""
+    rng = np.random.default_rng(seed)
+    shape, cells = scene.body.points.shape, len(scene.body.cells)
+    u, v = 1e-3 * rng.uniform(-1, 1, shape), 0.1 * rng.uniform(-1, 1, shape)
+    q, rate = rng.uniform(-1, 1, (2, 2, 3)) * [2e-3, 2e-3, 0.1]
+    return State(
+        0.03, u, v, rng.uniform(-2e3, 2e3, cells), rigid=q, rigid_rate=10 * rate,
+        sliding=rng.uniform(-1, 1, len(scene.sliding[0].nodes(scene.body))),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_forces_on_bones_and_sliding_nodes_agree(seed):
+    """The FEniCSx side is given the displacements that the bones give their nodes."""
+    from dolfin_tongue.coupling import RigidBodies
+    from dolfin_tongue.system import System
+
+    scene = carried_block()
+    model, system = Model(problem_of(scene)), System(scene, dynamic=True)
+    state = random_state(scene, seed)
+    u, v = model.rows(state)
+    count = len(scene.body.points)
+    state = replace(state, displacement=u[:count], velocity=v[:count])
+    acceleration = np.random.default_rng(seed).uniform(-5, 5, state.displacement.shape)
+    y, rate = system.vectors(state)
+    y_two = system.mixed(acceleration)
+    system.set_state(state.time, y, rate, y_two, y)
+    rows = system.reactions(state.time)
+    (rigid,) = (part for part in system.couplings if isinstance(part, RigidBodies))
+    theirs = rigid.tissue_force(state.rigid.ravel(), rows).reshape(-1, 3)
+    ours = model.force_on_bodies(state, acceleration)
+    assert relative(ours, theirs) <= 1e-12
+    # The rows of free nodes, sliding ones among them.
+    force = model.force(state.time, u, v)
+    model.add_constraint_force(model.constraint_gradients(u), model.multipliers(state), force)
+    mine = (force[:count] - model.mass[:count, :count] @ acceleration)[scene_free(scene)]
+    assert relative(mine, -system.displacement(rows)[scene_free(scene)]) <= 1e-12
+
+
+def scene_free(scene: Scene) -> np.ndarray:
+    """Numbers of the nodes that no bone carries."""
+    return np.setdiff1d(np.arange(len(scene.body.points)), scene.held_nodes)
+
+
+@pytest.mark.parametrize("make", [hinged_bone, carried_block])
+def test_motions_converge_to_each_other(make):
+    """At order 2: differences of nodes and coordinates fall to a quarter with half the step."""
+    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+
+    scene, steps, gaps = make(), (2e-3, 1e-3, 5e-4), []
+    *_, fine = Direct(scene, Implicit(1e-4, newton=1e-11)).march(0.04)
+    for dt in steps:
+        *_, last = Dynamics(scene, TimeSteps(dt)).march(0.04)
+        turn = 0.05 * np.abs(last.rigid[:, 2] - fine.rigid[:, 2]).max()
+        gaps.append(max(float(np.abs(last.displacement - fine.displacement).max()), turn))
+    assert min(orders(steps, gaps)) > 1.8, gaps
+    assert gaps[-1] < 1e-3 * np.abs(fine.displacement).max()
