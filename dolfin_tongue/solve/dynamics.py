@@ -119,7 +119,7 @@ class Dynamics:
         self.steps = steps or TimeSteps()
         self._velocity_before: FloatArray | None = None
         self._multipliers_before: FloatArray | None = None
-        self._refusal = ""
+        self._refusal, self._stepped = "", False
         self._multipliers = np.zeros(len(self.system.multiplier_dofs))
         self._connect()
 
@@ -286,7 +286,7 @@ class Dynamics:
                 self._connect()
                 self._set_vectors(before, *begin)
                 continue
-            self._restore(begin, before, rolled_back)
+            self._restore(begin, before, rolled_back and not self._stepped)
             rolled_back = True
         time = end if abs(self.ts.getTime() - end) <= 1e-9 * dt else self.ts.getTime()
         self.ts.setTime(time)
@@ -295,6 +295,7 @@ class Dynamics:
 
     def _try_step(self) -> int:
         """One TS step; the reason of its last Newton solve."""
+        self._stepped = False
         self.ts.setConvergedReason(PETSc.TS.ConvergedReason.ITERATING)
         try:
             self.ts.step()
@@ -302,6 +303,7 @@ class Dynamics:
             self.newton.reraise(error)
             return Reason.DIVERGED_LINEAR_SOLVE
         reason = self.ts.getSNES().getConvergedReason()
+        self._stepped = reason > 0
         return self._judged(reason) if reason > 0 else reason
 
     def _judged(self, reason: int) -> int:
@@ -355,9 +357,10 @@ class Dynamics:
     ) -> None:
         """Return to the begin of a step that failed, with the acceleration that was there.
 
-        TS keeps that for the next try if it was told to roll back; a try that fails does not undo
-        the telling. An acceleration estimated anew would add the velocity's error across the
-        volume condition over and over, until repeated cuts let the velocities grow as 1/dt.
+        TS keeps that for the next try if it was told to roll back. A try that fails does not undo
+        the telling; one that TS completed, and that we refuse, does. An acceleration estimated anew
+        would add the velocity's error across the volume condition over and over, until repeated
+        cuts let the velocities grow as 1/dt.
         """
         if not rolled_back:
             self.ts.rollBack()
