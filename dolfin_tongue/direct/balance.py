@@ -44,7 +44,7 @@ def drift(model: Model, states: Iterable[State]) -> Drift:
     kinetic = max(0.5 * float(np.sum(s.velocity * (model.mass @ s.velocity))) for s in states)
     pairs = [momentum(model, s) for s in states]
     linear, angular = (np.array(part) for part in zip(*pairs, strict=True))
-    energy = np.array([model.energy(s.displacement, s.velocity) for s in states])
+    energy = np.array([model.energy(s.displacement, s.velocity, s.time) for s in states])
     return Drift(
         float(np.linalg.norm(linear - linear[0], axis=1).max() / nodal.sum(axis=1).max()),
         float(np.linalg.norm(angular - angular[0], axis=1).max() / (nodal @ lever).max()),

@@ -32,12 +32,14 @@ class FaceKind:
     corners : 3 or 4.
     nodes : ndarray, shape (s, k) -- for each such face its nodes in the element: the corners
         outward by the right-hand rule, then the nodes on the edges between them.
-    gradients : ndarray, shape (q, k, 2) -- Y_K,alpha at the quadrature points, the same on all.
+    shapes : ndarray, shape (q, k) -- Y_K at the quadrature points, the same on all.
+    gradients : ndarray, shape (q, k, 2) -- Y_K,alpha there.
     weights : ndarray, shape (q,).
     """
 
     corners: int
     nodes: IntArray
+    shapes: FloatArray
     gradients: FloatArray
     weights: FloatArray
 
@@ -125,16 +127,19 @@ def _quadrilaterals(kind: ElementKind, nodes: IntArray, count: int) -> FaceKind:
     a, b, c, d = kind.nodes[nodes[0, :4]]
     tangents = np.stack([b - a, d - a], axis=1) / 2.0
     points = (a + b + c + d) / 4.0 + np.stack([s, t], axis=1) @ tangents.T
-    gradients = kind.gradients(points)[:, nodes[0]] @ tangents
-    return FaceKind(4, nodes, np.ascontiguousarray(gradients), np.outer(weight, weight).ravel())
+    shapes = np.ascontiguousarray(kind.shapes(points)[:, nodes[0]])
+    gradients = np.ascontiguousarray(kind.gradients(points)[:, nodes[0]] @ tangents)
+    return FaceKind(4, nodes, shapes, gradients, np.outer(weight, weight).ravel())
 
 
 def _triangles(kind: ElementKind, nodes: IntArray) -> FaceKind:
-    """Plane faces over a triangle, where one point is exact."""
+    """Plane faces over a triangle, with one point: exact for membranes."""
     a, b, c = kind.nodes[nodes[0]]
     tangents = np.stack([b - a, c - a], axis=1)
-    gradients = kind.gradients(((a + b + c) / 3.0)[None])[:, nodes[0]] @ tangents
-    return FaceKind(3, nodes, np.ascontiguousarray(gradients), np.array([0.5]))
+    middle = ((a + b + c) / 3.0)[None]
+    shapes = np.ascontiguousarray(kind.shapes(middle)[:, nodes[0]])
+    gradients = np.ascontiguousarray(kind.gradients(middle)[:, nodes[0]] @ tangents)
+    return FaceKind(3, nodes, shapes, gradients, np.array([0.5]))
 
 
 _BRICK = np.array(
