@@ -64,6 +64,11 @@ class Obstacle:
         self.slices = [slice(a, b) for a, b in pairwise(ends)]
 
     @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"contact of {self.term.surface!r} with the {type(self.term.obstacle).__name__}"
+
+    @property
     def impassable(self) -> bool:
         """Whether the law stops a body for good: one with an energy; a rated one lets it creep."""
         return not self.rated

@@ -28,12 +28,13 @@ costs 0.15 ms, new factors 1 ms. Runge-Kutta 4 is stable there up to 0.028 ms.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import sqrt
 
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.direct.impacts import Impacts
 from dolfin_tongue.direct.integrate import before
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
@@ -113,6 +114,7 @@ class Motion:
     time : s.
     u, v, a : displacement, velocity, acceleration, shape (n, 3).
     pressure : shape (m,), Pa.
+    contact : nodal forces of each obstacle, as they act in M a, shape (n, 3), N.
     """
 
     time: float
@@ -120,6 +122,7 @@ class Motion:
     v: FloatArray
     a: FloatArray
     pressure: FloatArray
+    contact: list[FloatArray] = field(default_factory=list)
 
 
 class Failed(Exception):
@@ -133,7 +136,8 @@ class ImplicitStepper:
         self.method, self.model = method, model
         self.saddle = Saddle(model)
         self.initial = Acceleration(model, None)
-        self.factorisations = self.evaluations = self.iterations = 0
+        self.impacts = Impacts(model)
+        self.factorisations = self.evaluations = self.iterations = self.euler_steps = 0
         self._solver: Solver
         self._stale = True  # whether the next correction needs new factors
         self._solver_step = 0.0
@@ -148,7 +152,10 @@ class ImplicitStepper:
         u, v = state.displacement.copy(), state.velocity.copy()
         self.model.hold(state.time, u, v)
         a, pressure = self.initial(state.time, u, v)
-        self._now, self._inner, self._stale = Motion(state.time, u, v, a, pressure), None, True
+        contact = self.impacts.forces(state.time, u, v)
+        self._now = Motion(state.time, u, v, a, pressure, contact)
+        self._inner, self._stale = None, True
+        self.impacts.begin(v)
         return State(state.time, u, v, pressure, state.step)
 
     def segment(self, state: State, end: float) -> Iterator[State]:
@@ -169,7 +176,7 @@ class ImplicitStepper:
             time = end if dt >= remaining * (1 - 1e-12) else state.time + dt
             try:
                 with np.errstate(all="ignore"):
-                    inner, new, error = self._step(dt, time, end)
+                    inner, new, error = self._any_step(dt, time, end)
             except Failed as failure:
                 cause, factor = str(failure), 0.25
             else:
@@ -181,6 +188,8 @@ class ImplicitStepper:
             dt *= factor
             if dt < smallest:
                 raise lost(self.model, state, dt, cause)
+        if self.model.obstacles:
+            self.impacts.accept(new.v, *self._pending)
         self._now, self._inner = new, inner
         count = self.iterations - iterations
         return State(new.time, new.u, new.v, new.pressure, dt, count), self._next(dt, factor)
@@ -202,6 +211,44 @@ class ImplicitStepper:
         return float(np.clip(taken * (factor if factor > 1.3 else 1.0), *self.method.step_limits))
 
     # -- one step ------------------------------------------------------------------------------
+
+    def _any_step(self, h: float, time: float, end: float) -> tuple[Motion | None, Motion, float]:
+        """Take a step of TR-BDF2, or of Euler's method where contact does not allow that."""
+        if not self.model.obstacles:
+            return self._step(h, time, end)
+        try:
+            inner, new, error = self._step(h, time, end)
+            weights = ((W, self._now), (W, inner), (D, new))
+            if self._contact_allows(h, new, weights, euler=False):
+                return inner, new, error
+        except Failed:
+            pass
+        self._stale = True
+        new = self._stage(
+            time, h / D, end, self._now.u, self._now.v, np.zeros_like(self._now.a),
+            self._now.pressure,
+        )  # fmt: skip
+        self._project(new)
+        self.euler_steps += 1
+        if not self._contact_allows(h, new, ((1.0, new),), euler=True):
+            raise Failed(self.impacts.passed(time, new.u))
+        return None, new, 0.5 * h * float(np.abs(new.v - self._now.v).max())
+
+    def _contact_allows(
+        self, h: float, new: Motion, weights: tuple[tuple[float, Motion], ...], euler: bool
+    ) -> bool:
+        now, impacts = self._now, self.impacts
+        if impacts.passed(new.time, new.u):
+            return False
+        impulses = [
+            sum(h * weight * point.contact[i] for weight, point in weights)
+            for i in range(len(impacts.obstacles))
+        ]
+        made = impacts.made(h, (now.time, new.time), (now.u, new.u), (now.v, new.v), impulses)
+        if not (euler or impacts.affordable(made)):
+            return False
+        self._pending = (made, impulses)
+        return True
 
     def _step(self, h: float, time: float, end: float) -> tuple[Motion, Motion, float]:
         """Both stages and the projection; returns inner stage, end and error of a displacement."""
@@ -246,6 +293,7 @@ class ImplicitStepper:
         point = Motion(time, u_known, v_known + step * guess, guess, pressure.copy())
         self._place(point, u_known, v_known, step)
         self._solve_stage(point, u_known, v_known, step, h, before(time, end))
+        point.contact = self.impacts.forces(before(time, end), point.u, point.v)
         return point
 
     def _solve_stage(
@@ -272,7 +320,7 @@ class ImplicitStepper:
                 continue
             if sizes[-1] <= method.newton:
                 return
-            if method.patience == 0 or (renewals < 2 and self._slow(sizes)):
+            if method.patience == 0 or ((renewals < 2 or self.model.obstacles) and self._slow(sizes)):
                 self._stale = True
             elif len(sizes) > 1 and sizes[-1] > 2 * sizes[-2]:
                 raise Failed("Newton's method diverges")
