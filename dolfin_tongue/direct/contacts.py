@@ -10,6 +10,8 @@ law per reference area dA,
     -dF_K/dV_L = -w dA Y_K Y_L t_h' n n^T.
 
 Only points nearer than the range of the law are passed to it.
+
+An obstacle that nothing comes near costs an interpolation of positions: see `Obstacle._near`.
 """
 
 from __future__ import annotations
@@ -45,6 +47,10 @@ class Touch:
     gap: float
 
 
+#: No points, and their gaps.
+NOWHERE = (np.zeros(0, np.int64), Gap(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3))))
+
+
 class Obstacle:
     """One `Contact` on its faces.
 
@@ -58,10 +64,12 @@ class Obstacle:
     def __init__(self, term: Contact, groups: list[FaceGroup], points: FloatArray):
         self.term, self.groups, self.rated = term, groups, term.law.rated
         self.points = points
+        self._clear = -1.0
         self.areas = np.concatenate([_areas(group, points) for group in groups])
         #: Per group: its points among all.
         ends = np.cumsum([0, *(len(group.faces) * len(group.kind.weights) for group in groups)])
         self.slices = [slice(a, b) for a, b in pairwise(ends)]
+        self._seen = np.zeros((len(self.areas), 3))
 
     @property
     def name(self) -> str:
@@ -80,15 +88,29 @@ class Obstacle:
             interpolate(values, group.faces, group.kind.shapes, out[part])
         return out
 
-    def gap(self, time: float, x: FloatArray) -> Gap:
-        """Gap at the points for nodes at x, shape (n, 3), m."""
-        return self.term.obstacle.gap(self.at_points(x) - self.term.shift(time)[0])
+    def _places(self, time: float, x: FloatArray) -> FloatArray:
+        """Positions of the points against the obstacle for nodes at x, shape (n, 3), m."""
+        return self.at_points(x) - self.term.shift(time)[0]
 
     def _near(self, time: float, x: FloatArray) -> tuple[IntArray, Gap]:
-        """Points nearer than the range, with their gaps."""
-        gap = self.gap(time, x)
+        """Points nearer than the range, with their gaps.
+
+        A distance changes by no more than the point moves: while no point has moved by as much as
+        was clear when the gaps were last asked for, they need not be asked for.
+        """
+        places = self._places(time, x)
+        if farthest(places, self._seen) < self._clear:
+            return NOWHERE
+        gap = self.term.obstacle.gap(places)
         near = np.flatnonzero(~(gap.distance >= self.term.law.range))  # a NaN is to be noticed
+        if not near.size and np.isfinite(gap.distance).all():
+            self._seen, self._clear = places, float(gap.distance.min()) - self.term.law.range
         return near, Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
+
+    def smallest_gap(self, time: float, x: FloatArray) -> float:
+        """Smallest gap within the range of the law, m; inf if there is none."""
+        near, gap = self._near(time, x)
+        return float(gap.distance.min()) if near.size else np.inf
 
     def _relative(self, time: float, v: FloatArray, near: IntArray) -> FloatArray | None:
         """Velocity against the obstacle, shape (j, 3); None where the law does not ask."""
@@ -149,7 +171,7 @@ class Obstacle:
 
     def touch(self, time: float, displacement: FloatArray, velocity: FloatArray) -> Touch:
         """Area, resultant, largest traction and smallest gap at a state."""
-        gap = self.gap(time, self.points + displacement)
+        gap = self.term.obstacle.gap(self._places(time, self.points + displacement))
         near = np.flatnonzero(gap.distance < self.term.law.range)
         part = Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
         traction, _, _ = self._law(part, self._relative(time, velocity, near))
@@ -189,6 +211,21 @@ def interpolate(values: FloatArray, faces: IntArray, shapes: FloatArray, out: Fl
                 for node in range(faces.shape[1]):
                     value += shapes[q, node] * values[faces[face, node], i]
                 out[face * count + q, i] = value
+
+
+@compiled
+def farthest(points: FloatArray, others: FloatArray) -> float:
+    """Return the largest distance of points to others of the same number; NaN if one is."""
+    largest = 0.0
+    for point in range(points.shape[0]):
+        square = 0.0
+        for i in range(3):
+            square += (points[point, i] - others[point, i]) ** 2
+        if not square <= largest:
+            largest = square
+            if square != square:
+                break
+    return np.sqrt(largest)
 
 
 @compiled

@@ -6,9 +6,12 @@ import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.direct.model import Model
+from dolfin_tongue.errors import BadScene
 
-#: Energy that contact may make by errors of TR-BDF2, over the largest kinetic energy so far.
+#: Energy that contact may make by errors of a method, over the largest kinetic energy so far.
 GAIN = 1e-3
+#: Time after which that is forgotten, s: a body that presses for long is not to be refused for ever.
+MEMORY = 0.1
 
 
 class Impacts:
@@ -39,10 +42,15 @@ class Impacts:
         """Which obstacle a point has reached or passed, in words; empty if none."""
         for obstacle in self.obstacles:
             if obstacle.impassable:
-                gap = obstacle.gap(time, self.model.mesh.points + u).distance
-                if not gap.min() > 0:
-                    return f"{obstacle.name}: a point is {-gap.min():.2g} m behind the obstacle"
+                gap = obstacle.smallest_gap(time, self.model.mesh.points + u)
+                if not gap > 0:
+                    return f"a point would be {-gap:.2g} m behind the obstacle; {obstacle.name}"
         return ""
+
+    def near(self, time: float, u: FloatArray) -> bool:
+        """Whether a point is within the range of a contact."""
+        x = self.model.mesh.points + u
+        return any(obstacle.smallest_gap(time, x) < np.inf for obstacle in self.obstacles)
 
     def made(
         self,
@@ -50,25 +58,31 @@ class Impacts:
         times: tuple[float, float],
         u: tuple[FloatArray, FloatArray],
         v: tuple[FloatArray, FloatArray],
+        forces: tuple[list[FloatArray], list[FloatArray]],
         impulses: list[FloatArray],
     ) -> float:
         """Energy that contact made in a step, J: work on the body and on the obstacle, and stored.
 
         The work of the impulses J on the body is J.(v_0 + v_1)/2, exactly: it is what they add to
-        the kinetic energy.
+        the kinetic energy. The part of the force that lasts over the step, though, balances others,
+        like a load: its work is that along the path, as theirs is.
         """
         total, x = 0.0, self.model.mesh.points
-        for obstacle, impulse in zip(self.obstacles, impulses, strict=True):
+        pairs = zip(*forces, strict=True)
+        for obstacle, pair, impulse in zip(self.obstacles, pairs, impulses, strict=True):
             if not impulse.any():
                 continue
+            path, mean = u[1] - u[0], 0.5 * h * (v[0] + v[1])
             moved = obstacle.term.shift(times[1])[0] - obstacle.term.shift(times[0])[0]
-            total += 0.5 * float(np.sum(impulse * (v[0] + v[1])))
-            total -= float(impulse.sum(axis=0) @ moved) / h
+            total += float(np.sum(impulse * (mean - moved))) / h
+            total += float(np.sum(lasting(*pair) * (path - mean)))
             total += obstacle.energy(times[1], x + u[1]) - obstacle.energy(times[0], x + u[0])
         return total
 
-    def begin(self, v: FloatArray) -> None:
-        """Take a velocity as a new beginning."""
+    def begin(self, time: float, u: FloatArray, v: FloatArray) -> None:
+        """Take a state as a new beginning; BadScene where it is behind an obstacle."""
+        if cause := self.passed(time, u):
+            raise BadScene(f"t = {time:.6g} s, the beginning: {cause}")
         self._kinetic = max(self._kinetic, self._kinetic_energy(v))
 
     def _kinetic_energy(self, v: FloatArray) -> float:
@@ -78,9 +92,17 @@ class Impacts:
         """Whether so much made energy is within what errors may make in all."""
         return self._made + made <= GAIN * self._kinetic
 
-    def accept(self, v: FloatArray, made: float, impulses: list[FloatArray]) -> None:
+    def accept(self, h: float, v: FloatArray, made: float, impulses: list[FloatArray]) -> None:
         """Count a step; what it lost is not there to be made later."""
-        self._made = max(0.0, self._made + made)
+        self._made = max(0.0, self._made + made) * np.exp(-h / MEMORY)
         self._kinetic = max(self._kinetic, self._kinetic_energy(v))
         for total, impulse in zip(self.impulses, impulses, strict=True):
             total += impulse.sum(axis=0)
+
+
+def lasting(first: FloatArray, last: FloatArray) -> FloatArray:
+    """Return the part of nodal forces, shape (n, 3), that two instants have in common."""
+    squares = [np.sum(force**2, axis=1) for force in (first, last)]
+    common = np.clip(np.sum(first * last, axis=1), 0.0, None)
+    larger = np.where((squares[0] > squares[1])[:, None], first, last)
+    return (common / np.maximum(np.maximum(*squares), 1e-300))[:, None] * larger

@@ -137,6 +137,7 @@ class ImplicitStepper:
         self.saddle = Saddle(model)
         self.initial = Acceleration(model, None)
         self.impacts = Impacts(model)
+        self.log=[]
         self.factorisations = self.evaluations = self.iterations = self.euler_steps = 0
         self._solver: Solver
         self._stale = True  # whether the next correction needs new factors
@@ -155,7 +156,7 @@ class ImplicitStepper:
         contact = self.impacts.forces(state.time, u, v)
         self._now = Motion(state.time, u, v, a, pressure, contact)
         self._inner, self._stale = None, True
-        self.impacts.begin(v)
+        self.impacts.begin(state.time, u, v)
         return State(state.time, u, v, pressure, state.step)
 
     def segment(self, state: State, end: float) -> Iterator[State]:
@@ -178,6 +179,7 @@ class ImplicitStepper:
                 with np.errstate(all="ignore"):
                     inner, new, error = self._any_step(dt, time, end)
             except Failed as failure:
+                self.log.append((state.time,dt,str(failure)))
                 cause, factor = str(failure), 0.25
             else:
                 factor = self._factor(error)
@@ -189,7 +191,7 @@ class ImplicitStepper:
             if dt < smallest:
                 raise lost(self.model, state, dt, cause)
         if self.model.obstacles:
-            self.impacts.accept(new.v, *self._pending)
+            self.impacts.accept(dt, new.v, *self._pending)
         self._now, self._inner = new, inner
         count = self.iterations - iterations
         return State(new.time, new.u, new.v, new.pressure, dt, count), self._next(dt, factor)
@@ -222,7 +224,9 @@ class ImplicitStepper:
             if self._contact_allows(h, new, weights, euler=False):
                 return inner, new, error
         except Failed:
-            pass
+            now, onward = self._now, self._now.u + h * self._now.v
+            if not (self.impacts.near(now.time, now.u) or self.impacts.near(time, onward)):
+                raise
         self._stale = True
         new = self._stage(
             time, h / D, end, self._now.u, self._now.v, np.zeros_like(self._now.a),
@@ -244,7 +248,10 @@ class ImplicitStepper:
             sum(h * weight * point.contact[i] for weight, point in weights)
             for i in range(len(impacts.obstacles))
         ]
-        made = impacts.made(h, (now.time, new.time), (now.u, new.u), (now.v, new.v), impulses)
+        made = impacts.made(
+            h, (now.time, new.time), (now.u, new.u), (now.v, new.v), (now.contact, new.contact),
+            impulses,
+        )  # fmt: skip
         if not (euler or impacts.affordable(made)):
             return False
         self._pending = (made, impulses)
