@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.errors import BadScene
 
-#: Energy that contact may make by errors of a method, over the largest kinetic energy so far.
+#: Energy that contact may make by errors of a method, over the largest energy so far, kinetic and
+#: stored in contacts.
 GAIN = 1e-3
-#: Time after which that is forgotten, s: a body that presses for long is not to be refused for ever.
+#: Time after which that is forgotten, s, so that a body that presses for long is not refused.
 MEMORY = 0.1
+
+
+class Refused(Exception):
+    """A step after which a point is behind an obstacle, or in which contact makes energy."""
 
 
 class Impacts:
@@ -27,7 +34,12 @@ class Impacts:
         self.obstacles = [obstacle for _, obstacle in model.obstacles]
         #: Impulses on the tissue since the beginning of the run, shape (obstacles, 3), N s.
         self.impulses = np.zeros((len(self.obstacles), 3))
-        self._kinetic = self._made = 0.0
+        self._largest = self._made = 0.0
+
+    @property
+    def names(self) -> str:
+        """What messages call the contacts."""
+        return ", ".join(obstacle.name for obstacle in self.obstacles)
 
     def forces(self, time: float, u: FloatArray, v: FloatArray) -> list[FloatArray]:
         """Nodal forces of each obstacle, shape (n, 3), N."""
@@ -83,19 +95,54 @@ class Impacts:
         """Take a state as a new beginning; BadScene where it is behind an obstacle."""
         if cause := self.passed(time, u):
             raise BadScene(f"t = {time:.6g} s, the beginning: {cause}")
-        self._kinetic = max(self._kinetic, self._kinetic_energy(v))
+        self._largest = max(self._largest, self._energy(time, u, v))
 
-    def _kinetic_energy(self, v: FloatArray) -> float:
-        return 0.5 * float(np.sum(v * (self.model.mass @ v)))
+    def explicit(
+        self,
+        h: float,
+        new: tuple[float, FloatArray, FloatArray],
+        stages: Sequence[tuple[float, FloatArray, FloatArray]],
+        weights: Sequence[float],
+    ) -> None:
+        """Count a step of an explicit method, from its stages (time, u, v); or raise Refused."""
+        time, u, v = new
+        if cause := self.passed(time, u):
+            raise Refused(cause)
+        first = stages[0]
+        if not (self.near(time, u) or self.near(*first[:2])):
+            return
+        forces = [self.forces(*stage) for stage in stages]
+        impulses = [
+            sum((h * weight * part[i] for weight, part in zip(weights, forces, strict=True)), 0 * u)
+            for i in range(len(self.obstacles))
+        ]
+        ends = (forces[0], self.forces(*new))
+        made = self.made(h, (first[0], time), (first[1], u), (first[2], v), ends, impulses)
+        if not self.affordable(made):
+            raise Refused(f"it would make {made:.2g} J of energy; {self.names}")
+        self.accept(h, new, made, impulses)
+
+    def _energy(self, time: float, u: FloatArray, v: FloatArray) -> float:
+        """Kinetic energy, and that stored in contacts, J."""
+        kinetic = 0.5 * float(np.sum(v * (self.model.mass @ v)))
+        x = self.model.mesh.points + u
+        return kinetic + sum(obstacle.energy(time, x) for obstacle in self.obstacles)
 
     def affordable(self, made: float) -> bool:
         """Whether so much made energy is within what errors may make in all."""
-        return self._made + made <= GAIN * self._kinetic
+        return self._made + made <= GAIN * self._largest
 
-    def accept(self, h: float, v: FloatArray, made: float, impulses: list[FloatArray]) -> None:
+    def accept(
+        self,
+        h: float,
+        new: tuple[float, FloatArray, FloatArray],
+        made: float,
+        impulses: list[FloatArray],
+    ) -> None:
         """Count a step; what it lost is not there to be made later."""
+        time, u, v = new
         self._made = max(0.0, self._made + made) * np.exp(-h / MEMORY)
-        self._kinetic = max(self._kinetic, self._kinetic_energy(v))
+        self._largest = max(self._largest, self._energy(time, u, v))
         for total, impulse in zip(self.impulses, impulses, strict=True):
             total += impulse.sum(axis=0)
 

@@ -137,7 +137,7 @@ class ImplicitStepper:
         self.saddle = Saddle(model)
         self.initial = Acceleration(model, None)
         self.impacts = Impacts(model)
-        self.log=[]
+        self.log = []
         self.factorisations = self.evaluations = self.iterations = self.euler_steps = 0
         self._solver: Solver
         self._stale = True  # whether the next correction needs new factors
@@ -179,7 +179,7 @@ class ImplicitStepper:
                 with np.errstate(all="ignore"):
                     inner, new, error = self._any_step(dt, time, end)
             except Failed as failure:
-                self.log.append((state.time,dt,str(failure)))
+                self.log.append((state.time, dt, str(failure)))
                 cause, factor = str(failure), 0.25
             else:
                 factor = self._factor(error)
@@ -191,7 +191,7 @@ class ImplicitStepper:
             if dt < smallest:
                 raise lost(self.model, state, dt, cause)
         if self.model.obstacles:
-            self.impacts.accept(dt, new.v, *self._pending)
+            self.impacts.accept(dt, (new.time, new.u, new.v), *self._pending)
         self._now, self._inner = new, inner
         count = self.iterations - iterations
         return State(new.time, new.u, new.v, new.pressure, dt, count), self._next(dt, factor)
@@ -327,7 +327,9 @@ class ImplicitStepper:
                 continue
             if sizes[-1] <= method.newton:
                 return
-            if method.patience == 0 or ((renewals < 2 or self.model.obstacles) and self._slow(sizes)):
+            if method.patience == 0 or (
+                (renewals < 2 or self.model.obstacles) and self._slow(sizes)
+            ):
                 self._stale = True
             elif len(sizes) > 1 and sizes[-1] > 2 * sizes[-2]:
                 raise Failed("Newton's method diverges")

@@ -6,7 +6,9 @@ All eigenvalues s of the motion then have |s| <= (c + sqrt(c^2 + 4 w^2)) / 2. Th
 adds the double eigenvalue -1/tau. Runge-Kutta 4 is stable where |s| dt <= 2.61 anywhere in the left
 half-plane (2.785 on the real axis), so that dt is refused beyond 2.61 / max(|s|, 1/tau).
 
-The radii come from power iterations; each term has its own, which tells the cause.
+The radii come from power iterations; each term has its own, which tells the cause. Contact is seen
+where it presses at the state; what it may become within a step is judged after the step, by the
+energy that it made (`impacts`).
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.constitutive.active import FibreStress
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
@@ -68,7 +71,8 @@ class StabilityLimits:
 
     def _cause(self, state: tuple[float, FloatArray, FloatArray], rate: float) -> str:
         """Name the term whose own radius is the largest."""
-        terms = [term for term, _ in (*self.model.laws, *self.model.membranes)]
+        model = self.model
+        terms = [term for term, _ in (*model.laws, *model.membranes, *model.obstacles)]
         parts = [self._radii(i, state, None, (term,)) for i, term in enumerate(terms)]
         bounds = [_bound(*part) for part in parts]
         worst = int(np.argmax(bounds)) if bounds else 0
@@ -133,6 +137,9 @@ def _describe(term: Term, c: float, w: float, rate: float) -> str:
     name = type(term).__name__
     if isinstance(term, FibreStress):
         kind = "the active stiffness" + (" (force-velocity slope)" if c > w else "")
+    elif isinstance(term, Contact):
+        kind = "the contact damping" if c > w else "the contact stiffness"
+        name = f"{term.surface!r} on {type(term.obstacle).__name__}"
     elif isinstance(term, SurfaceTerm):
         kind = "the surface stiffness"
     else:
