@@ -1,8 +1,19 @@
-"""What contact may do in a step of the implicit method: nothing passes, no energy is made."""
+"""What contact may do in a step: nothing passes an obstacle, and no energy is made.
+
+The energy that contact makes in a step with the impulses J (time integrals of its nodal forces by
+the method's own weights) is
+
+    J.(V_0 + V_1)/2 - (sum of J).(s_1 - s_0)/h + psi_1 - psi_0:
+
+what J adds to the kinetic energy (exactly that, since M (V_1 - V_0) = J + other impulses), less the
+work of the obstacle that moves by s, plus what is stored. It is not positive in nature, and an
+error of the method where it is. `Impacts.judge` lets such errors add up to `GAIN` of the energy.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,13 +23,30 @@ from dolfin_tongue.errors import BadScene
 
 #: Energy that contact may make by errors of a method, over the largest energy so far, kinetic and
 #: stored in contacts.
-GAIN = 1e-3
+GAIN = 1e-2
 #: Time after which that is forgotten, s, so that a body that presses for long is not refused.
 MEMORY = 0.1
 
 
 class Refused(Exception):
     """A step after which a point is behind an obstacle, or in which contact makes energy."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """A stage or an end of a step.
+
+    Parameters
+    ----------
+    time : s.
+    u, v : displacement and velocity, shape (n, 3).
+    forces : nodal forces of each obstacle, shape (n, 3), N, as they act in the method.
+    """
+
+    time: float
+    u: FloatArray
+    v: FloatArray
+    forces: list[FloatArray]
 
 
 class Impacts:
@@ -35,20 +63,20 @@ class Impacts:
         #: Impulses on the tissue since the beginning of the run, shape (obstacles, 3), N s.
         self.impulses = np.zeros((len(self.obstacles), 3))
         self._largest = self._made = 0.0
+        self._pending: tuple[Instant, float, float, FloatArray] | None = None
 
     @property
     def names(self) -> str:
         """What messages call the contacts."""
         return ", ".join(obstacle.name for obstacle in self.obstacles)
 
-    def forces(self, time: float, u: FloatArray, v: FloatArray) -> list[FloatArray]:
-        """Nodal forces of each obstacle, shape (n, 3), N."""
-        result = []
+    def instant(self, time: float, u: FloatArray, v: FloatArray) -> Instant:
+        """Evaluate the contacts at a state."""
+        forces = []
         for obstacle in self.obstacles:
-            force = np.zeros_like(u)
-            obstacle.add_force(time, self.model.mesh.points + u, v, force)
-            result.append(force)
-        return result
+            forces.append(np.zeros_like(u))
+            obstacle.add_force(time, self.model.mesh.points + u, v, forces[-1])
+        return Instant(time, u, v, forces)
 
     def passed(self, time: float, u: FloatArray) -> str:
         """Which obstacle a point has reached or passed, in words; empty if none."""
@@ -64,38 +92,77 @@ class Impacts:
         x = self.model.mesh.points + u
         return any(obstacle.smallest_gap(time, x) < np.inf for obstacle in self.obstacles)
 
-    def made(
-        self,
-        h: float,
-        times: tuple[float, float],
-        u: tuple[FloatArray, FloatArray],
-        v: tuple[FloatArray, FloatArray],
-        forces: tuple[list[FloatArray], list[FloatArray]],
-        impulses: list[FloatArray],
-    ) -> float:
-        """Energy that contact made in a step, J: work on the body and on the obstacle, and stored.
-
-        The work of the impulses J on the body is J.(v_0 + v_1)/2, exactly: it is what they add to
-        the kinetic energy. The part of the force that lasts over the step, though, balances others,
-        like a load: its work is that along the path, as theirs is.
-        """
-        total, x = 0.0, self.model.mesh.points
-        pairs = zip(*forces, strict=True)
-        for obstacle, pair, impulse in zip(self.obstacles, pairs, impulses, strict=True):
-            if not impulse.any():
-                continue
-            path, mean = u[1] - u[0], 0.5 * h * (v[0] + v[1])
-            moved = obstacle.term.shift(times[1])[0] - obstacle.term.shift(times[0])[0]
-            total += float(np.sum(impulse * (mean - moved))) / h
-            total += float(np.sum(lasting(*pair) * (path - mean)))
-            total += obstacle.energy(times[1], x + u[1]) - obstacle.energy(times[0], x + u[0])
-        return total
-
     def begin(self, time: float, u: FloatArray, v: FloatArray) -> None:
         """Take a state as a new beginning; BadScene where it is behind an obstacle."""
+        if not self.obstacles:
+            return
         if cause := self.passed(time, u):
             raise BadScene(f"t = {time:.6g} s, the beginning: {cause}")
         self._largest = max(self._largest, self._energy(time, u, v))
+
+    def judge(
+        self,
+        h: float,
+        first: Instant,
+        last: Instant,
+        stages: Sequence[tuple[float, Instant]],
+        dissipates: bool = False,
+    ) -> str:
+        """Why a step is not to be accepted, in words; empty if it may be, by `accept`.
+
+        Parameters
+        ----------
+        h : step, s.
+        first, last : its ends.
+        stages : with the weights of their forces in the velocity.
+        dissipates : the method makes no energy; only the gaps are asked for.
+        """
+        if cause := self.passed(last.time, last.u):
+            return cause
+        made, total = 0.0, np.zeros_like(self.impulses)
+        for number in range(len(self.obstacles)):
+            impulse = np.zeros_like(first.u)
+            for weight, stage in stages:
+                impulse += h * weight * stage.forces[number]
+            if impulse.any():
+                made += self._made_by(number, h, first, last, impulse)
+                total[number] = impulse.sum(axis=0)
+        if not dissipates and self._made + made > GAIN * self._largest:
+            return f"it would make {made:.2g} J of energy; {self.names}"
+        self._pending = (last, h, made, total)
+        return ""
+
+    def _made_by(
+        self, number: int, h: float, first: Instant, last: Instant, impulse: FloatArray
+    ) -> float:
+        """Energy that one contact makes in a step, J.
+
+        The part of the force that lasts over the step balances others, like a load: its work is
+        that along the path, as theirs is, and not that of the mean velocity.
+        """
+        obstacle, x = self.obstacles[number], self.model.mesh.points
+        path, mean = last.u - first.u, 0.5 * h * (first.v + last.v)
+        moved = obstacle.term.shift(last.time)[0] - obstacle.term.shift(first.time)[0]
+        work = float(np.sum(impulse * (mean - moved))) / h
+        steady = lasting(first.forces[number], last.forces[number])
+        work += float(np.sum(steady * (path - mean)))
+        stored = obstacle.energy(last.time, x + last.u) - obstacle.energy(first.time, x + first.u)
+        return work + stored
+
+    def accept(self) -> None:
+        """Count the step that was judged last; what it lost is not there to be made later."""
+        if self._pending is not None:
+            last, h, made, impulses = self._pending
+            self._made = max(0.0, self._made + made) * np.exp(-h / MEMORY)
+            self._largest = max(self._largest, self._energy(last.time, last.u, last.v))
+            self.impulses += impulses
+            self._pending = None
+
+    def _energy(self, time: float, u: FloatArray, v: FloatArray) -> float:
+        """Kinetic energy, and that stored in contacts, J."""
+        kinetic = 0.5 * float(np.sum(v * (self.model.mass @ v)))
+        x = self.model.mesh.points + u
+        return kinetic + sum(obstacle.energy(time, x) for obstacle in self.obstacles)
 
     def explicit(
         self,
@@ -105,46 +172,15 @@ class Impacts:
         weights: Sequence[float],
     ) -> None:
         """Count a step of an explicit method, from its stages (time, u, v); or raise Refused."""
-        time, u, v = new
-        if cause := self.passed(time, u):
+        if cause := self.passed(new[0], new[1]):
             raise Refused(cause)
-        first = stages[0]
-        if not (self.near(time, u) or self.near(*first[:2])):
+        if not (self.near(*new[:2]) or self.near(*stages[0][:2])):
             return
-        forces = [self.forces(*stage) for stage in stages]
-        impulses = [
-            sum((h * weight * part[i] for weight, part in zip(weights, forces, strict=True)), 0 * u)
-            for i in range(len(self.obstacles))
-        ]
-        ends = (forces[0], self.forces(*new))
-        made = self.made(h, (first[0], time), (first[1], u), (first[2], v), ends, impulses)
-        if not self.affordable(made):
-            raise Refused(f"it would make {made:.2g} J of energy; {self.names}")
-        self.accept(h, new, made, impulses)
-
-    def _energy(self, time: float, u: FloatArray, v: FloatArray) -> float:
-        """Kinetic energy, and that stored in contacts, J."""
-        kinetic = 0.5 * float(np.sum(v * (self.model.mass @ v)))
-        x = self.model.mesh.points + u
-        return kinetic + sum(obstacle.energy(time, x) for obstacle in self.obstacles)
-
-    def affordable(self, made: float) -> bool:
-        """Whether so much made energy is within what errors may make in all."""
-        return self._made + made <= GAIN * self._largest
-
-    def accept(
-        self,
-        h: float,
-        new: tuple[float, FloatArray, FloatArray],
-        made: float,
-        impulses: list[FloatArray],
-    ) -> None:
-        """Count a step; what it lost is not there to be made later."""
-        time, u, v = new
-        self._made = max(0.0, self._made + made) * np.exp(-h / MEMORY)
-        self._largest = max(self._largest, self._energy(time, u, v))
-        for total, impulse in zip(self.impulses, impulses, strict=True):
-            total += impulse.sum(axis=0)
+        parts = [self.instant(*stage) for stage in stages]
+        weighted = list(zip(weights, parts, strict=True))
+        if cause := self.judge(h, parts[0], self.instant(*new), weighted):
+            raise Refused(cause)
+        self.accept()
 
 
 def lasting(first: FloatArray, last: FloatArray) -> FloatArray:

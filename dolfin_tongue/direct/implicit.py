@@ -34,7 +34,7 @@ from math import sqrt
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.direct.impacts import Impacts
+from dolfin_tongue.direct.impacts import Impacts, Instant
 from dolfin_tongue.direct.integrate import before
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
@@ -124,6 +124,11 @@ class Motion:
     pressure: FloatArray
     contact: list[FloatArray] = field(default_factory=list)
 
+    @property
+    def instant(self) -> Instant:
+        """What contact is judged by."""
+        return Instant(self.time, self.u, self.v, self.contact)
+
 
 class Failed(Exception):
     """A stage did not converge."""
@@ -137,7 +142,6 @@ class ImplicitStepper:
         self.saddle = Saddle(model)
         self.initial = Acceleration(model, None)
         self.impacts = Impacts(model)
-        self.log = []
         self.factorisations = self.evaluations = self.iterations = self.euler_steps = 0
         self._solver: Solver
         self._stale = True  # whether the next correction needs new factors
@@ -145,6 +149,7 @@ class ImplicitStepper:
         zero = np.zeros_like(model.load)
         self._now = Motion(0.0, zero, zero, zero, np.zeros(model.cell_count))
         self._inner: Motion | None = None
+        self._close = False  # whether the step starts or is going to end near an obstacle
 
     # -- marching ------------------------------------------------------------------------------
 
@@ -153,7 +158,7 @@ class ImplicitStepper:
         u, v = state.displacement.copy(), state.velocity.copy()
         self.model.hold(state.time, u, v)
         a, pressure = self.initial(state.time, u, v)
-        contact = self.impacts.forces(state.time, u, v)
+        contact = self.impacts.instant(state.time, u, v).forces
         self._now = Motion(state.time, u, v, a, pressure, contact)
         self._inner, self._stale = None, True
         self.impacts.begin(state.time, u, v)
@@ -179,7 +184,6 @@ class ImplicitStepper:
                 with np.errstate(all="ignore"):
                     inner, new, error = self._any_step(dt, time, end)
             except Failed as failure:
-                self.log.append((state.time, dt, str(failure)))
                 cause, factor = str(failure), 0.25
             else:
                 factor = self._factor(error)
@@ -190,8 +194,7 @@ class ImplicitStepper:
             dt *= factor
             if dt < smallest:
                 raise lost(self.model, state, dt, cause)
-        if self.model.obstacles:
-            self.impacts.accept(dt, (new.time, new.u, new.v), *self._pending)
+        self.impacts.accept()
         self._now, self._inner = new, inner
         count = self.iterations - iterations
         return State(new.time, new.u, new.v, new.pressure, dt, count), self._next(dt, factor)
@@ -218,44 +221,25 @@ class ImplicitStepper:
         """Take a step of TR-BDF2, or of Euler's method where contact does not allow that."""
         if not self.model.obstacles:
             return self._step(h, time, end)
+        now, impacts = self._now, self.impacts
+        self._close = impacts.near(now.time, now.u) or impacts.near(time, now.u + h * now.v)
         try:
             inner, new, error = self._step(h, time, end)
-            weights = ((W, self._now), (W, inner), (D, new))
-            if self._contact_allows(h, new, weights, euler=False):
+            first, second, third = (part.instant for part in (now, inner, new))
+            if not impacts.judge(h, first, third, ((W, first), (W, second), (D, third))):
                 return inner, new, error
         except Failed:
-            now, onward = self._now, self._now.u + h * self._now.v
-            if not (self.impacts.near(now.time, now.u) or self.impacts.near(time, onward)):
+            if not self._close:
                 raise
-        self._stale = True
-        new = self._stage(
-            time, h / D, end, self._now.u, self._now.v, np.zeros_like(self._now.a),
-            self._now.pressure,
-        )  # fmt: skip
+        self._stale = self._close = True
+        still = np.zeros_like(now.a)
+        new = self._stage(time, h / D, end, now.u, now.v, still, now.pressure)
         self._project(new)
+        last = new.instant
+        if cause := impacts.judge(h, now.instant, last, ((1.0, last),), dissipates=True):
+            raise Failed(cause)
         self.euler_steps += 1
-        if not self._contact_allows(h, new, ((1.0, new),), euler=True):
-            raise Failed(self.impacts.passed(time, new.u))
-        return None, new, 0.5 * h * float(np.abs(new.v - self._now.v).max())
-
-    def _contact_allows(
-        self, h: float, new: Motion, weights: tuple[tuple[float, Motion], ...], euler: bool
-    ) -> bool:
-        now, impacts = self._now, self.impacts
-        if impacts.passed(new.time, new.u):
-            return False
-        impulses = [
-            sum(h * weight * point.contact[i] for weight, point in weights)
-            for i in range(len(impacts.obstacles))
-        ]
-        made = impacts.made(
-            h, (now.time, new.time), (now.u, new.u), (now.v, new.v), (now.contact, new.contact),
-            impulses,
-        )  # fmt: skip
-        if not (euler or impacts.affordable(made)):
-            return False
-        self._pending = (made, impulses)
-        return True
+        return None, new, 0.5 * h * float(np.abs(new.v - now.v).max())
 
     def _step(self, h: float, time: float, end: float) -> tuple[Motion, Motion, float]:
         """Both stages and the projection; returns inner stage, end and error of a displacement."""
@@ -300,7 +284,7 @@ class ImplicitStepper:
         point = Motion(time, u_known, v_known + step * guess, guess, pressure.copy())
         self._place(point, u_known, v_known, step)
         self._solve_stage(point, u_known, v_known, step, h, before(time, end))
-        point.contact = self.impacts.forces(before(time, end), point.u, point.v)
+        point.contact = self.impacts.instant(before(time, end), point.u, point.v).forces
         return point
 
     def _solve_stage(
@@ -314,28 +298,27 @@ class ImplicitStepper:
     ) -> None:
         """Newton's method on a stage, or the given number of corrections."""
         method = self.method
+        corrections = None if self._close else method.corrections
         sizes: list[float] = []
         renewals = 0
-        for _ in range(method.corrections or 3 * method.iterations):
+        for _ in range(corrections or 3 * method.iterations):
             if self._stale:
                 self._renew(time, point, step, h)
                 sizes, renewals = [], renewals + 1
             sizes.append(self._correct(time, point, u_known, v_known, step))
             if not np.isfinite(sizes[-1]):
                 raise Failed("a stage is not finite")
-            if method.corrections is not None:
+            if corrections is not None:
                 continue
             if sizes[-1] <= method.newton:
                 return
-            if method.patience == 0 or (
-                (renewals < 2 or self.model.obstacles) and self._slow(sizes)
-            ):
+            if method.patience == 0 or ((renewals < 2 or self._close) and self._slow(sizes)):
                 self._stale = True
             elif len(sizes) > 1 and sizes[-1] > 2 * sizes[-2]:
                 raise Failed("Newton's method diverges")
             elif len(sizes) >= method.iterations:
                 break
-        if method.corrections is None:
+        if corrections is None:
             raise Failed(f"Newton's method needs more than {method.iterations} iterations")
 
     def _slow(self, sizes: list[float]) -> bool:
