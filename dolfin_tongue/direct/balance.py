@@ -52,7 +52,7 @@ def drift(model: Model, states: Iterable[State]) -> Drift:
     pairs = [momentum(model, s) for s in states]
     linear, angular = (np.array(part) for part in zip(*pairs, strict=True))
     energy = np.array(
-        [model.energy(s.displacement, s.velocity, s.rigid, s.rigid_rate) for s in states]
+        [model.energy(s.displacement, s.velocity, s.rigid, s.rigid_rate, s.time) for s in states]
     )
     return Drift(
         float(np.linalg.norm(linear - linear[0], axis=1).max() / nodal.sum(axis=1).max()),

@@ -6,7 +6,8 @@ by the two parameters of the face are those of the element along two edges of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 
@@ -32,14 +33,18 @@ class FaceKind:
     corners : 3 or 4.
     nodes : ndarray, shape (s, k) -- for each such face its nodes in the element: the corners
         outward by the right-hand rule, then the nodes on the edges between them.
-    gradients : ndarray, shape (q, k, 2) -- Y_K,alpha at the quadrature points, the same on all.
+    shapes : ndarray, shape (q, k) -- Y_K at the quadrature points, the same on all.
+    gradients : ndarray, shape (q, k, 2) -- Y_K,alpha there.
     weights : ndarray, shape (q,).
+    at_nodes : the same faces with a rule that has points at the nodes.
     """
 
     corners: int
     nodes: IntArray
+    shapes: FloatArray
     gradients: FloatArray
     weights: FloatArray
+    at_nodes: FaceKind | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +72,11 @@ class FaceGroup:
         corners = self.faces[:, : self.kind.corners]
         width = ((0, 0), (4 - self.kind.corners, 0))
         return np.sort(np.pad(corners, width, constant_values=-1), axis=1)
+
+    def for_contact(self) -> FaceGroup:
+        """Return the same faces with points at the nodes, so that no corner passes between two."""
+        assert self.kind.at_nodes is not None
+        return replace(self, kind=self.kind.at_nodes)
 
     def part(self, chosen: IntArray) -> FaceGroup:
         """Pick some of the faces."""
@@ -118,23 +128,57 @@ def surface_groups(mesh: Mesh, corners: IntArray) -> list[FaceGroup]:
 # -- tables --------------------------------------------------------------------------------------
 
 
-def _quadrilaterals(kind: ElementKind, nodes: IntArray, count: int) -> FaceKind:
-    """Faces over [-1, 1]^2 with count x count Gauss points."""
-    point, weight = np.polynomial.legendre.leggauss(count)
-    s, t = (grid.ravel() for grid in np.meshgrid(point, point, indexing="ij"))
+#: Points on [-1, 1] and weights, some at the nodes: Simpson's rule, and Lobatto's with five points.
+SIMPSON = (np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3.0)
+LOBATTO5 = (
+    np.array([-1.0, -sqrt(3 / 7), 0.0, sqrt(3 / 7), 1.0]),
+    np.array([1 / 10, 49 / 90, 32 / 45, 49 / 90, 1 / 10]),
+)
+
+#: Barycentric points of a triangle and their weights: its middle; corners, edges and middle.
+MIDDLE = (np.full((1, 3), 1 / 3), np.array([0.5]))
+SEVEN = (
+    np.concatenate([np.eye(3), (1 - np.eye(3)) / 2, np.full((1, 3), 1 / 3)]),
+    np.array([1, 1, 1, 8 / 3, 8 / 3, 8 / 3, 9]) / 40,
+)
+
+Rule = tuple[FloatArray, FloatArray]
+
+
+def _quadrilaterals(kind: ElementKind, nodes: IntArray, count: int, at_nodes: Rule) -> FaceKind:
+    """Faces over [-1, 1]^2 with count x count Gauss points, for contact with another rule."""
     a, b, c, d = kind.nodes[nodes[0, :4]]
     tangents = np.stack([b - a, d - a], axis=1) / 2.0
-    points = (a + b + c + d) / 4.0 + np.stack([s, t], axis=1) @ tangents.T
-    gradients = kind.gradients(points)[:, nodes[0]] @ tangents
-    return FaceKind(4, nodes, np.ascontiguousarray(gradients), np.outer(weight, weight).ravel())
+
+    def faces(rule: Rule, other: FaceKind | None) -> FaceKind:
+        point, weight = rule
+        s, t = (grid.ravel() for grid in np.meshgrid(point, point, indexing="ij"))
+        points = (a + b + c + d) / 4.0 + np.stack([s, t], axis=1) @ tangents.T
+        tables = _tables(kind, nodes[0], points, tangents)
+        return FaceKind(4, nodes, *tables, np.outer(weight, weight).ravel(), other)
+
+    return faces(np.polynomial.legendre.leggauss(count), faces(at_nodes, None))
 
 
 def _triangles(kind: ElementKind, nodes: IntArray) -> FaceKind:
-    """Plane faces over a triangle, where one point is exact."""
-    a, b, c = kind.nodes[nodes[0]]
-    tangents = np.stack([b - a, c - a], axis=1)
-    gradients = kind.gradients(((a + b + c) / 3.0)[None])[:, nodes[0]] @ tangents
-    return FaceKind(3, nodes, np.ascontiguousarray(gradients), np.array([0.5]))
+    """Plane faces over a triangle: one point is exact for membranes, contact has seven."""
+    corners = kind.nodes[nodes[0]]
+    tangents = np.stack([corners[1] - corners[0], corners[2] - corners[0]], axis=1)
+
+    def faces(rule: Rule, other: FaceKind | None) -> FaceKind:
+        points, weights = rule
+        tables = _tables(kind, nodes[0], points @ corners, tangents)
+        return FaceKind(3, nodes, *tables, weights, other)
+
+    return faces(MIDDLE, faces(SEVEN, None))
+
+
+def _tables(
+    kind: ElementKind, nodes: IntArray, points: FloatArray, tangents: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Y_K and Y_K,alpha at points of the master element, shapes (q, k) and (q, k, 2)."""
+    shapes = np.ascontiguousarray(kind.shapes(points)[:, nodes])
+    return shapes, np.ascontiguousarray(kind.gradients(points)[:, nodes] @ tangents)
 
 
 _BRICK = np.array(
@@ -153,11 +197,11 @@ def _with_middles(faces: IntArray) -> IntArray:
 
 #: Kind of element -> its kinds of faces.
 FACE_KINDS: dict[str, tuple[FaceKind, ...]] = {
-    "brick8": (_quadrilaterals(BRICK8, _BRICK, 2),),
-    "brick20": (_quadrilaterals(BRICK20, _with_middles(_BRICK), 3),),
+    "brick8": (_quadrilaterals(BRICK8, _BRICK, 2, SIMPSON),),
+    "brick20": (_quadrilaterals(BRICK20, _with_middles(_BRICK), 3, LOBATTO5),),
     "tetrahedron4": (_triangles(TETRAHEDRON4, _TETRAHEDRON),),
     "prism6": (
         _triangles(PRISM6, np.array([[0, 2, 1], [3, 4, 5]])),
-        _quadrilaterals(PRISM6, np.array([[0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]]), 2),
+        _quadrilaterals(PRISM6, np.array([[0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]]), 2, SIMPSON),
     ),
 }

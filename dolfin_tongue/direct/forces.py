@@ -1,8 +1,8 @@
 """From terms to forces: one law, load or membrane per class of term.
 
 A law adds first Piola-Kirchhoff stress at quadrature points; a load is a nodal force; a membrane
-acts on the faces of a surface. A term whose
-class is not registered is refused by name: a subclass may differ in physics, so that it does not
+acts on the faces of a surface, and so does an obstacle that they touch. A term whose class is not
+registered is refused by name: a subclass may differ in physics, so that it does not
 inherit the force of its base.
 """
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.boundary.gravity import Gravity
 from dolfin_tongue.boundary.skin import Skin
 from dolfin_tongue.boundary.surface_tension import SurfaceTension
@@ -22,6 +23,7 @@ from dolfin_tongue.constitutive.active import ActiveMuscles, ConstantFibreStress
 from dolfin_tongue.constitutive.passive import FibreReinforcedTissue, MooneyRivlin, ReportTissue
 from dolfin_tongue.constitutive.viscous import Viscosity
 from dolfin_tongue.direct import passive, rates
+from dolfin_tongue.direct.contacts import Obstacle
 from dolfin_tongue.direct.faces import FaceGroup, outer_groups, surface_groups
 from dolfin_tongue.direct.membranes import Film, Membrane, NeoHookean
 from dolfin_tongue.direct.mesh import Block, Mesh
@@ -316,12 +318,15 @@ MEMBRANES: dict[type[SurfaceTerm], Callable[..., Membrane]] = {
     Skin: NeoHookean,
 }
 
+#: Class of term -> its obstacle on some faces.
+CONTACTS: dict[type[Term], Callable[..., Obstacle]] = {Contact: Obstacle}
+
 
 def laws_of(term: Term, around: Surroundings) -> list[Law]:
-    """Laws of a term, one per block; none for a load or membrane. NoDirectForce without any."""
+    """Laws of a term, one per block; none for other kinds of terms. NoDirectForce without any."""
     if type(term) in LAWS:
         return [LAWS[type(term)](term, around, block) for block in around.mesh.blocks]
-    if type(term) in LOADS or type(term) in MEMBRANES:
+    if any(type(term) in registry for registry in (LOADS, MEMBRANES, CONTACTS)):
         return []
     raise NoDirectForce(term)
 
@@ -337,3 +342,10 @@ def membranes_of(term: Term, around: Surroundings) -> list[Membrane]:
         return []
     make, points = MEMBRANES[type(term)], around.mesh.points
     return [make(term, group, points) for group in around.faces(term.surface)]
+
+
+def obstacle_of(term: Term, around: Surroundings) -> Obstacle | None:
+    """Obstacle of a contact; None for other terms."""
+    if not (isinstance(term, Contact) and type(term) in CONTACTS):
+        return None
+    return CONTACTS[type(term)](term, around.faces(term.surface), around.mesh.points)

@@ -35,13 +35,14 @@ costs 0.15 ms, new factors 1 ms. Runge-Kutta 4 is stable there up to 0.028 ms.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import sqrt
 
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.direct.border import Border, condensed, condensed_gradient
+from dolfin_tongue.direct.impacts import Impacts, Instant
 from dolfin_tongue.direct.integrate import before
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
@@ -123,6 +124,7 @@ class Motion:
     time : s.
     u, v, a : displacement, velocity, acceleration of all rows, shape (N, 3).
     pressure : multipliers of all constraints, shape (c,), Pa.
+    contact : nodal forces of each obstacle, as they act in M a, shape (N, 3), N.
     """
 
     time: float
@@ -130,6 +132,12 @@ class Motion:
     v: FloatArray
     a: FloatArray
     pressure: FloatArray
+    contact: list[FloatArray] = field(default_factory=list)
+
+    @property
+    def instant(self) -> Instant:
+        """What contact is judged by."""
+        return Instant(self.time, self.u, self.v, self.contact)
 
 
 class Failed(Exception):
@@ -143,7 +151,8 @@ class ImplicitStepper:
         self.method, self.model = method, model
         self.saddle = Saddle(model)
         self.initial = Acceleration(model, None)
-        self.factorisations = self.evaluations = self.iterations = 0
+        self.impacts = Impacts(model)
+        self.factorisations = self.evaluations = self.iterations = self.euler_steps = 0
         self._solver: Solver
         self._nodal_solver: Solver  # with rigid bodies standing still
         self._stale = True  # whether the next correction needs new factors
@@ -152,6 +161,7 @@ class ImplicitStepper:
         self._now = Motion(0.0, zero, zero, zero, np.zeros(model.constraint_count))
         self._points = zero if model.bodies is None else zero[: model.bodies.centres.stop]
         self._inner: Motion | None = None
+        self._close = False  # whether the step starts or is going to end near an obstacle
 
     # -- marching ------------------------------------------------------------------------------
 
@@ -159,7 +169,10 @@ class ImplicitStepper:
         """Find acceleration and pressures of a beginning."""
         u, v = self.model.rows(state)
         a, pressure = self.initial(state.time, u, v)
-        self._now, self._inner, self._stale = Motion(state.time, u, v, a, pressure), None, True
+        contact = self.impacts.instant(state.time, u, v).forces
+        self._now = Motion(state.time, u, v, a, pressure, contact)
+        self._inner, self._stale = None, True
+        self.impacts.begin(state.time, u, v)
         return self.model.state(state.time, u, v, pressure, state.step)
 
     def segment(self, state: State, end: float) -> Iterator[State]:
@@ -180,7 +193,7 @@ class ImplicitStepper:
             time = end if dt >= remaining * (1 - 1e-12) else state.time + dt
             try:
                 with np.errstate(all="ignore"):
-                    inner, new, error = self._step(dt, time, end)
+                    inner, new, error = self._any_step(dt, time, end)
             except Failed as failure:
                 cause, factor = str(failure), 0.25
             else:
@@ -192,6 +205,7 @@ class ImplicitStepper:
             dt *= factor
             if dt < smallest:
                 raise lost(self.model, state, dt, cause)
+        self.impacts.accept()
         self._now, self._inner = new, inner
         count = self.iterations - iterations
         state = self.model.state(new.time, new.u, new.v, new.pressure, dt, count)
@@ -214,6 +228,30 @@ class ImplicitStepper:
         return float(np.clip(taken * (factor if factor > 1.3 else 1.0), *self.method.step_limits))
 
     # -- one step ------------------------------------------------------------------------------
+
+    def _any_step(self, h: float, time: float, end: float) -> tuple[Motion | None, Motion, float]:
+        """Take a step of TR-BDF2, or of Euler's method where contact does not allow that."""
+        if not self.model.obstacles:
+            return self._step(h, time, end)
+        now, impacts = self._now, self.impacts
+        self._close = impacts.near(now.time, now.u) or impacts.near(time, now.u + h * now.v)
+        try:
+            inner, new, error = self._step(h, time, end)
+            first, second, third = (part.instant for part in (now, inner, new))
+            if not impacts.judge(h, first, third, ((W, first), (W, second), (D, third))):
+                return inner, new, error
+        except Failed:
+            if not self._close:
+                raise
+        self._stale = self._close = True
+        still = np.zeros_like(now.a)
+        new = self._stage(time, h / D, end, now.u, now.v, still, now.pressure)
+        self._project(new)
+        last = new.instant
+        if cause := impacts.judge(h, now.instant, last, ((1.0, last),), dissipates=True):
+            raise Failed(cause)
+        self.euler_steps += 1
+        return None, new, 0.5 * h * float(np.abs(new.v - now.v).max())
 
     def _step(self, h: float, time: float, end: float) -> tuple[Motion, Motion, float]:
         """Both stages and the projection; returns inner stage, end and error of a displacement."""
@@ -259,6 +297,7 @@ class ImplicitStepper:
         point = Motion(time, u_known, v_known + step * guess, guess, pressure.copy())
         self._place(point, u_known, v_known, step)
         self._solve_stage(point, u_known, v_known, step, h, before(time, end))
+        point.contact = self.impacts.instant(before(time, end), point.u, point.v).forces
         return point
 
     def _solve_stage(
@@ -272,26 +311,27 @@ class ImplicitStepper:
     ) -> None:
         """Newton's method on a stage, or the given number of corrections."""
         method = self.method
+        corrections = None if self._close else method.corrections
         sizes: list[float] = []
         renewals = 0
-        for _ in range(method.corrections or 3 * method.iterations):
+        for _ in range(corrections or 3 * method.iterations):
             if self._stale:
                 self._renew(time, point, step, h)
                 sizes, renewals = [], renewals + 1
             sizes.append(self._correct(time, point, u_known, v_known, step))
             if not np.isfinite(sizes[-1]):
                 raise Failed("a stage is not finite")
-            if method.corrections is not None:
+            if corrections is not None:
                 continue
             if sizes[-1] <= method.newton:
                 return
-            if method.patience == 0 or (renewals < 2 and self._slow(sizes)):
+            if method.patience == 0 or ((renewals < 2 or self._close) and self._slow(sizes)):
                 self._stale = True
             elif len(sizes) > 1 and sizes[-1] > 2 * sizes[-2]:
                 raise Failed("Newton's method diverges")
             elif len(sizes) >= method.iterations:
                 break
-        if method.corrections is None:
+        if corrections is None:
             raise Failed(f"Newton's method needs more than {method.iterations} iterations")
 
     def _slow(self, sizes: list[float]) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.integrate import DOP853, RK45
 
 from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.direct.impacts import Impacts, Refused
 from dolfin_tongue.direct.limits import Limit, StabilityLimits
 from dolfin_tongue.direct.model import Model, Problem, problem_of
 from dolfin_tongue.direct.multipliers import Acceleration
@@ -25,6 +26,9 @@ from dolfin_tongue.state import State
 
 #: Relative volume change of a cell at which an explicit run is given up.
 LOST_VOLUME = 0.05
+
+#: Smallest step to which contact may cut, over dt.
+SHORTEST = 1e-4
 
 
 class Stepper(Protocol):
@@ -130,7 +134,8 @@ class RungeKutta4:
     tau : time constant of the volume constraints (55), s.
     constraint_metric : ``"dalembert"``, or ``"report"`` as printed; see `multipliers`.
     mass : ``"consistent"`` or ``"lumped"``.
-    cut : cut a step beyond the stability limit, with a warning, instead of refusing it.
+    cut : cut a step beyond the stability limit, with a warning, instead of refusing it; and one in
+        which a point passes an obstacle, or contact makes energy.
     watch : steps between two estimates of the stability limit.
     """
 
@@ -157,7 +162,10 @@ class RungeKutta4Stepper:
         self.method, self.model = method, model
         self.acceleration = Acceleration(model, method.tau, method.constraint_metric)
         self.limits = StabilityLimits(self.acceleration)
+        self.impacts = Impacts(model)
         self.dt = method.dt
+        self._short = np.inf  # step that contact allowed last, s
+        self._warned = False
         self._steps = 0
         self._started = False
         #: Displacement, velocity, acceleration at the last accepted state, all rows.
@@ -166,6 +174,7 @@ class RungeKutta4Stepper:
     def begin(self, state: State) -> State:
         """Find the pressures of a beginning and judge the step."""
         u, v = self.model.rows(state)
+        self.impacts.begin(state.time, u, v)
         a, multipliers = self.acceleration(state.time, u, v)
         self._now = u, v, a
         state = self.model.state(state.time, u, v, multipliers, state.step)
@@ -175,17 +184,21 @@ class RungeKutta4Stepper:
 
     def _judge(self, state: State, time: float) -> None:
         """Refuse the step, or cut it, where it is beyond the stability limit."""
-        limit = self._limit(state, time)
+        limit, last = self._limit(state, time), self.dt
+        if self.model.obstacles:  # their stiffness comes and goes
+            self.dt = self.method.dt
         if limit.step >= self.dt:
             return
         text = f"{limit.step:.3g} s, set by {limit.cause}"
         if self.method.cut:
+            self.dt = 0.9 * limit.step
+            if self.dt >= (0.5 * last if self.model.obstacles else last):
+                return
             warnings.warn(
-                f"t = {state.time:.6g} s: step cut from {self.dt:.3g} s to "
-                f"{0.9 * limit.step:.3g} s; the stability limit is {text}",
+                f"t = {state.time:.6g} s: step cut from {last:.3g} s to "
+                f"{self.dt:.3g} s; the stability limit is {text}",
                 RuntimeWarning, stacklevel=2,
             )  # fmt: skip
-            self.dt = 0.9 * limit.step
         elif not self._started:
             allowed = f"at most the stability limit, which {limit.cause} sets to {limit.step:.3g}"
             raise OutOfRange("dt", self.dt, allowed, "s")
@@ -201,13 +214,32 @@ class RungeKutta4Stepper:
         """March to the end of a smooth stretch with equal steps of at most dt."""
         while state.time < end:
             remaining = end - state.time
-            dt = remaining / max(1, int(np.ceil(remaining / self.dt - 1e-6)))
+            dt = min(self.dt, self._short)
+            dt = remaining / max(1, int(np.ceil(remaining / dt - 1e-6)))
             time = end if dt >= remaining * (1 - 1e-12) else state.time + dt
-            state = self._step(state, dt, time, end)
+            try:
+                state = self._step(state, dt, time, end)
+            except Refused as refused:
+                self._short = self._cut(state, dt, str(refused))
+                continue
+            self._short = 1.5 * dt if dt < self.dt else np.inf
             yield state
             self._steps += 1
             if self._steps % self.method.watch == 0:
                 self._judge(state, before(state.time, end))
+
+    def _cut(self, state: State, dt: float, cause: str) -> float:
+        """Half of a step that contact refused; NotConverged if it may not be cut any more."""
+        if not self.method.cut:
+            reason = f"dt = {dt:.3g} s is too long for contact: {cause}"
+            raise NotConverged(reason, state.time, "Take a smaller dt, cut=True, or Implicit")
+        if dt < SHORTEST * self.method.dt:
+            raise lost(self.model, state, dt, cause)
+        if not self._warned:
+            text = f"t = {state.time:.6g} s: contact cuts steps of {dt:.3g} s: {cause}"
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
+            self._warned = True
+        return dt / 2
 
     def _step(self, state: State, dt: float, time: float, end: float) -> State:
         """One step; the pressure is that of the new state."""
@@ -225,7 +257,14 @@ class RungeKutta4Stepper:
             change, _ = self.model.constraint(u_new)
             largest = np.abs(change / self.model.sizes).max()
             if not (np.isfinite(v_new).all() and largest <= LOST_VOLUME):
+                if self.impacts.near(t, u) or self.impacts.near(time, u + dt * v):
+                    raise Refused(f"the motion would be lost; {self.impacts.names}")
                 raise lost(self.model, state, dt, self._blame(state, dt, end))
+            if self.model.obstacles:
+                stages = ((t, u, v), (t + dt / 2, u2, v2), (t + dt / 2, u3, v3), (t + dt, u4, v4))
+                self.impacts.explicit(
+                    dt, (time, u_new, v_new), stages, (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+                )
             a, multipliers = self.acceleration(before(time, end), u_new, v_new)
         self._now = u_new, v_new, a
         return self.model.state(time, u_new, v_new, multipliers, dt)
@@ -287,11 +326,13 @@ class AdaptiveStepper:
     def __init__(self, method: Adaptive, model: Model):
         self.method, self.model = method, model
         self.acceleration = Acceleration(model, method.tau, method.constraint_metric)
+        self.impacts = Impacts(model)
         self._first: float | None = None
 
     def begin(self, state: State) -> State:
         """Find the pressures of a beginning."""
         u, v = self.model.rows(state)
+        self.impacts.begin(state.time, u, v)
         _, multipliers = self.acceleration(state.time, u, v)
         self._first = None
         return self.model.state(state.time, u, v, multipliers, state.step)
@@ -312,7 +353,11 @@ class AdaptiveStepper:
                     f"{message or 'not finite'}; explicit steps are limited to {limit.step:.3g} s "
                     f"by {limit.cause}",
                 )  # fmt: skip
-            state = self._state(solver, end)
+            new = self._state(solver, end)
+            if cause := self.impacts.passed(new.time, new.displacement):
+                text = "Take a smaller tolerance or `largest`, or Implicit"
+                raise NotConverged(cause, state.time, text)
+            state = new
             yield state
         self._first = solver.step_size
 

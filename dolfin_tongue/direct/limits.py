@@ -10,6 +10,8 @@ The radii come from power iterations; each term has its own, which tells the cau
 coordinates of rigid bodies take part, with their springs and dampers as one more term, which sets
 the limit of a light body. Tissue on a body, however light, is not faster than without it: rigid
 motion of its nodes and more mass both lower Rayleigh's quotient. Sliding nodes stay on surfaces.
+Contact is seen where it presses at the state; what it may become within a step is judged after the
+step, by the energy that it made (`impacts`).
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.constitutive.active import FibreStress
 from dolfin_tongue.direct.border import condensed
 from dolfin_tongue.direct.model import Model
@@ -75,7 +78,10 @@ class StabilityLimits:
 
     def _cause(self, state: State, rate: float) -> str:
         """Name the term whose own radius is the largest."""
-        terms: list[Term | None] = [term for term, _ in (*self.model.laws, *self.model.membranes)]
+        model = self.model
+        terms: list[Term | None] = [
+            term for term, _ in (*model.laws, *model.membranes, *model.obstacles)
+        ]
         if self.acceleration.columns is not None:
             terms.append(None)  # the loads of the rigid bodies
         parts = [
@@ -183,6 +189,9 @@ def _describe(term: Term, c: float, w: float, rate: float) -> str:
     name = type(term).__name__
     if isinstance(term, FibreStress):
         kind = "the active stiffness" + (" (force-velocity slope)" if c > w else "")
+    elif isinstance(term, Contact):
+        kind = "the contact damping" if c > w else "the contact stiffness"
+        name = f"{term.surface!r} on {type(term.obstacle).__name__}"
     elif isinstance(term, SurfaceTerm):
         kind = "the surface stiffness"
     else:

@@ -25,7 +25,15 @@ from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.boundary.attached import Attached
 from dolfin_tongue.direct import points, volume
 from dolfin_tongue.direct.bodies import Bodies
-from dolfin_tongue.direct.forces import Law, Surroundings, laws_of, load_of, membranes_of
+from dolfin_tongue.direct.contacts import Obstacle
+from dolfin_tongue.direct.forces import (
+    Law,
+    Surroundings,
+    laws_of,
+    load_of,
+    membranes_of,
+    obstacle_of,
+)
 from dolfin_tongue.direct.membranes import Membrane
 from dolfin_tongue.direct.mesh import Block, Mesh, mesh_of
 from dolfin_tongue.direct.slides import Slides
@@ -121,6 +129,7 @@ class Model:
         around = Surroundings(problem.mesh, problem.density, problem.fibres, problem.surfaces)
         self.laws: list[tuple[Term, list[Law]]] = []
         self.membranes: list[tuple[Term, list[Membrane]]] = []
+        self.obstacles: list[tuple[Term, Obstacle]] = []
         self.load = np.zeros(problem.mesh.points.shape)
         for term in problem.terms:
             laws, load = laws_of(term, around), load_of(term, around)
@@ -128,9 +137,12 @@ class Model:
                 self.laws.append((term, laws))
             if membranes := membranes_of(term, around):
                 self.membranes.append((term, membranes))
+            if (obstacle := obstacle_of(term, around)) is not None:
+                self.obstacles.append((term, obstacle))
             if load is not None:
                 self.load += load
-        self.rated = any(laws[0].rated for _, laws in self.laws)
+        self._strain_rates = any(laws[0].rated for _, laws in self.laws)
+        self.rated = self._strain_rates or any(part.rated for _, part in self.obstacles)
         self.lumped = mass == "lumped"
         self.element_masses = [self._element_masses(block) for block in self.blocks]
         self.mass = self._mass()
@@ -341,7 +353,7 @@ class Model:
         for block in self.blocks:
             F = np.empty((*block.shape, 3, 3))
             points.nodal_gradients(displacement, block.cells, block.gradients, 1.0, F)
-            rate = np.empty_like(F) if self.rated else None
+            rate = np.empty_like(F) if self._strain_rates else None
             if rate is not None:
                 points.nodal_gradients(velocity, block.cells, block.gradients, 0.0, rate)
             result.append((F, rate))
@@ -353,6 +365,8 @@ class Model:
         for _, membranes in self.membranes:
             for membrane in membranes:
                 membrane.add_force(self.position(displacement), out)
+        for _, obstacle in self.obstacles:
+            obstacle.add_force(time, self.position(displacement), velocity, out)
         if not self.laws:
             return out
         strains = self.strains(displacement, velocity)
@@ -401,6 +415,10 @@ class Model:
                 for part in membranes:
                     x = self.position(displacement)
                     part.add_tangent(x, factor, result[part.group.block])
+        for term, obstacle in self.obstacles:
+            if terms is None or any(term is one for one in terms):
+                x = self.position(displacement)
+                obstacle.add_tangent(time, x, velocity, factor, rate_factor, result)
         if self.slides is not None:
             result.append(np.zeros((len(self.slides.nodes), 3, 3)))
         return result
@@ -521,11 +539,13 @@ class Model:
         velocity: FloatArray,
         rigid: FloatArray | None = None,
         rigid_rate: FloatArray | None = None,
+        time: float = 0.0,
     ) -> float:
-        """Kinetic energy, stored energy of laws and membranes, and energy of the loads, J.
+        """Kinetic energy, stored energy of laws, membranes and contacts, energy of the loads, J.
 
         With coordinates and rates of the rigid bodies, shape (b, 3), their kinetic energy and that
-        of their weight are included; what their springs and muscles store is not.
+        of their weight are included; what their springs and muscles store is not. The time, s,
+        says where moved obstacles are.
         """
         total = 0.5 * float(np.sum(velocity * (self.mass @ velocity)))
         total -= float(np.sum(self.load * displacement))
@@ -533,6 +553,7 @@ class Model:
             total += self.bodies.energy(rigid, rigid_rate)
         x = self.position(displacement)
         total += sum(part.energy(x) for _, membranes in self.membranes for part in membranes)
+        total += sum(obstacle.energy(time, x) for _, obstacle in self.obstacles)
         strains = self.strains(displacement, velocity)
         for number, (block, (F, _)) in enumerate(zip(self.blocks, strains, strict=True)):
             for _, laws in self.laws:

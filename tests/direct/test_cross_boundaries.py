@@ -6,19 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cases import relative
+from cases import apply_matrices, relative
 
 from benchmarks.extremes.proofs import hinged_bone
-from dolfin_tongue.boundary import Gravity, Sliding, moved_onto
+from dolfin_tongue.boundary import (
+    Barrier,
+    Contact,
+    Gravity,
+    ReportContact,
+    Sliding,
+    moved_onto,
+)
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
-from dolfin_tongue.control import Constant
+from dolfin_tongue.control import Constant, SmoothMove, Still, Swing
 from dolfin_tongue.direct import Direct, Implicit, Model, problem_of
-from dolfin_tongue.geometry.simple import block_body
+from dolfin_tongue.geometry.simple import block_body, distort
 from dolfin_tongue.rigid import AngularSpring, LineMuscle, RigidBody
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.state import State
 from dolfin_tongue.study import orders
-from dolfin_tongue.surfaces import Sphere
+from dolfin_tongue.surfaces import Plane, Sphere
 
 pytest.importorskip("dolfinx")
 
@@ -79,6 +86,50 @@ def test_forces_on_bones_and_sliding_nodes_agree(seed):
     model.add_constraint_force(model.constraint_gradients(u), model.multipliers(state), force)
     mine = (force[:count] - model.mass[:count, :count] @ acceleration)[scene_free(scene)]
     assert relative(mine, -system.displacement(rows)[scene_free(scene)]) <= 1e-12
+
+
+CONTACTS = {
+    "barrier, plane": Contact(Plane((0.0, 0.0, -1e-3), (0.1, 0.0, 1.0)), "z0", Barrier(5e-3)),
+    "barrier, moving ball": Contact(
+        Sphere((0.015, 0.01, 0.05), 0.028), "z1", Barrier(5e-3), (Still(), Still(), Swing(1e-3, 5))
+    ),
+    "report's law, bowl": Contact(
+        Sphere((0.015, 0.01, 0.098), 0.1, inside=True), law=ReportContact(range=8e-3)
+    ),
+    "report's palate": Contact(
+        Plane((0.0, 0.0, 0.022), (0.0, 0.1, -1.0)), "boundary", ReportContact(1e9, 1.5, 2.0, 4e-3),
+        (Still(), Swing(1e-3, 5), SmoothMove(1e-3)),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CONTACTS)
+def test_forces_and_tangents_of_contact_agree(name):
+    from petsc4py import PETSc
+
+    from dolfin_tongue.system import System
+
+    body = distort(block_body((0.03, 0.02, 0.02), (3, 2, 2)), 5e-4)
+    scene = Scene(body, (CONTACTS[name],))
+    model, system = Model(problem_of(scene)), System(scene, dynamic=True)
+    rng = np.random.default_rng(3)
+    u, v = 3e-4 * rng.uniform(-1, 1, body.points.shape), 0.1 * rng.uniform(-1, 1, body.points.shape)
+    y, rate, time = system.mixed(u), system.mixed(v), 0.03
+    system.set_state(time, y, rate, 0 * y, y)
+    out = np.zeros(system.size)
+    system.residual(time, out)
+    force = model.force(time, u, v)
+    assert np.abs(force).max() > 1e-4
+    assert relative(force, -system.displacement(out)) <= 1e-12
+    matrix = system.new_matrix()
+    way = rng.uniform(-1, 1, u.shape)
+    for shift in (0.0, 130.0):
+        system.jacobian(matrix, (shift, 0.0, 1.0), time)
+        x = PETSc.Vec().createWithArray(system.mixed(way))
+        image = x.duplicate()
+        matrix.mult(x, image)
+        ours = apply_matrices(model, model.element_tangents(time, u, v, 1.0, shift), way)
+        assert relative(ours, system.displacement(image.array_r)) <= 1e-12
 
 
 def scene_free(scene: Scene) -> np.ndarray:

@@ -375,7 +375,9 @@ class Opened(Held):
         return body.nodes("x0")
 
     def displacement(self, points, time):
-        return plane.displacement(points - PIVOT, [0.0, 0.0, SmoothMove(-0.1745).at(time)[0]])
+        return plane.displacement(
+            points - PIVOT, np.array([0.0, 0.0, SmoothMove(-0.1745).at(time)[0]])
+        )
 
 
 def test_a_prescribed_body_moves_the_tissue_as_held_nodes_do():

@@ -1,0 +1,279 @@
+"""Contact with rigid obstacles by hand: nodal forces, tangents, energy, and what is to be seen.
+
+At each point of the faces in the reference configuration (some are nodes, see
+`FaceGroup.for_contact`) the position is x = Y_K (X^K + U^K) (43), the gap h(x - s) with the obstacle
+moved by s(t), its normal n = grad h, its curvature H = grad n and the rate h' = n.(v - s') (58),
+(59). With the traction t(h, h') of the law per reference area dA,
+
+    F_K = w dA t n Y_K,
+    -dF_K/dU_L = -w dA Y_K Y_L [n (t_h n + t_h' H (v - s'))^T + t H],
+    -dF_K/dV_L = -w dA Y_K Y_L t_h' n n^T.
+
+Only points nearer than the range of the law are passed to it.
+
+An obstacle that nothing comes near costs an interpolation of positions: see `Obstacle._near`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.boundary.contact import Contact
+from dolfin_tongue.direct.faces import FaceGroup
+from dolfin_tongue.direct.jit import compiled
+from dolfin_tongue.direct.membranes import base_vectors, determinant
+from dolfin_tongue.surfaces.base import Gap
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """What a contact does at one instant.
+
+    Parameters
+    ----------
+    area : reference area of the points nearer than the range of the law, m2.
+    resultant : ndarray, shape (3,) -- force on the tissue, N.
+    traction : the largest, Pa.
+    gap : the smallest, m; inf where the obstacle does not reach.
+    """
+
+    area: float
+    resultant: FloatArray
+    traction: float
+    gap: float
+
+
+#: No points, and their gaps.
+NOWHERE = (np.zeros(0, np.int64), Gap(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3))))
+
+
+class Obstacle:
+    """One `Contact` on its faces.
+
+    Parameters
+    ----------
+    term : obstacle, law and motion.
+    groups : the faces, with k points in all.
+    points : ndarray, shape (n, 3), m -- reference positions.
+    """
+
+    def __init__(self, term: Contact, groups: list[FaceGroup], points: FloatArray):
+        groups = [group.for_contact() for group in groups]
+        self.term, self.groups, self.rated = term, groups, term.law.rated
+        self.points = points
+        self._clear = -1.0
+        self.areas = np.concatenate([_areas(group, points) for group in groups])
+        #: Per group: its points among all.
+        ends = np.cumsum([0, *(len(group.faces) * len(group.kind.weights) for group in groups)])
+        self.slices = [slice(a, b) for a, b in pairwise(ends)]
+        self._seen = np.zeros((len(self.areas), 3))
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"contact of {self.term.surface!r} with the {type(self.term.obstacle).__name__}"
+
+    @property
+    def impassable(self) -> bool:
+        """Whether the law stops a body for good: one with an energy; a rated one lets it creep."""
+        return not self.rated
+
+    def at_points(self, values: FloatArray) -> FloatArray:
+        """Values at the points from those at nodes, shape (n, 3); shape (k, 3)."""
+        out = np.empty((len(self.areas), 3))
+        for group, part in zip(self.groups, self.slices, strict=True):
+            interpolate(values, group.faces, group.kind.shapes, out[part])
+        return out
+
+    def _places(self, time: float, x: FloatArray) -> FloatArray:
+        """Positions of the points against the obstacle for nodes at x, shape (n, 3), m."""
+        return self.at_points(x) - self.term.shift(time)[0]
+
+    def _near(self, time: float, x: FloatArray) -> tuple[IntArray, Gap]:
+        """Points nearer than the range, with their gaps.
+
+        A distance changes by no more than the point moves: while no point has moved by as much as
+        was clear when the gaps were last asked for, they need not be asked for.
+        """
+        places = self._places(time, x)
+        if farthest(places, self._seen) < self._clear:
+            return NOWHERE
+        gap = self.term.obstacle.gap(places)
+        near = np.flatnonzero(~(gap.distance >= self.term.law.range))  # a NaN is to be noticed
+        if not near.size and np.isfinite(gap.distance).all():
+            self._seen, self._clear = places, float(gap.distance.min()) - self.term.law.range
+        return near, Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
+
+    def smallest_gap(self, time: float, x: FloatArray) -> float:
+        """Smallest gap within the range of the law, m; inf if there is none."""
+        near, gap = self._near(time, x)
+        return float(gap.distance.min()) if near.size else np.inf
+
+    def _relative(self, time: float, v: FloatArray, near: IntArray) -> FloatArray | None:
+        """Velocity against the obstacle, shape (j, 3); None where the law does not ask."""
+        return self.at_points(v)[near] - self.term.shift(time)[1] if self.rated else None
+
+    def add_force(self, time: float, x: FloatArray, v: FloatArray, out: FloatArray) -> None:
+        """Add the nodal forces at positions x and velocities v, shape (n, 3), to out, N."""
+        near, gap = self._near(time, x)
+        if not near.size:
+            return
+        traction, _, _ = self._law(gap, self._relative(time, v, near))
+        force = np.zeros((len(self.areas), 3))
+        force[near] = (self.areas[near] * traction)[:, None] * gap.normal
+        for group, part in zip(self.groups, self.slices, strict=True):
+            spread(force[part], group.faces, group.kind.shapes, out)
+
+    def _law(
+        self, gap: Gap, relative: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray | float]:
+        rate = None if relative is None else np.einsum("ji,ji->j", gap.normal, relative)
+        return self.term.law.traction(gap.distance, rate)
+
+    def add_tangent(
+        self,
+        time: float,
+        x: FloatArray,
+        v: FloatArray,
+        factor: float,
+        rate_factor: float,
+        out: list[FloatArray],
+    ) -> None:
+        """Add -(factor dF/dU + rate_factor dF/dV) to the element matrices of the blocks."""
+        near, gap = self._near(time, x)
+        if not near.size:
+            return
+        relative = self._relative(time, v, near)
+        traction, by_gap, by_rate = self._law(gap, relative)
+        n = gap.normal
+        row = (factor * by_gap + rate_factor * by_rate)[:, None] * n
+        if relative is not None:
+            turned = np.einsum("jab,jb->ja", gap.curvature, relative)
+            row += factor * np.asarray(by_rate)[:, None] * turned
+        parts = n[:, :, None] * row[:, None] + factor * traction[:, None, None] * gap.curvature
+        matrices = np.zeros((len(self.areas), 3, 3))
+        matrices[near] = -self.areas[near, None, None] * parts
+        touched = np.zeros(len(self.areas), dtype=np.bool_)
+        touched[near] = True
+        for group, part in zip(self.groups, self.slices, strict=True):
+            add_matrices(
+                matrices[part], touched[part], group.kind.shapes, group.cells, group.local,
+                out[group.block],
+            )  # fmt: skip
+
+    def energy(self, time: float, x: FloatArray) -> float:
+        """Energy, J; zero for a rated law."""
+        near, gap = self._near(time, x)
+        return float(np.sum(self.areas[near] * self.term.law.energy(gap.distance)))
+
+    def touch(self, time: float, displacement: FloatArray, velocity: FloatArray) -> Touch:
+        """Area, resultant, largest traction and smallest gap at a state."""
+        gap = self.term.obstacle.gap(self._places(time, self.points + displacement))
+        near = np.flatnonzero(gap.distance < self.term.law.range)
+        part = Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
+        traction, _, _ = self._law(part, self._relative(time, velocity, near))
+        force = (self.areas[near] * traction) @ part.normal
+        largest = float(traction.max()) if near.size else 0.0
+        return Touch(float(self.areas[near].sum()), force, largest, float(gap.distance.min()))
+
+
+def _areas(group: FaceGroup, points: FloatArray) -> FloatArray:
+    """Return the reference area of each quadrature point of a group, shape (f q,), m2."""
+    kind = group.kind
+    shape = (len(group.faces), len(kind.weights))
+    base, metric = np.empty((*shape, 2, 3)), np.empty((*shape, 3))
+    base_vectors(points, group.faces, kind.gradients, base, metric)
+    return (kind.weights * np.sqrt(determinant(metric))).ravel()
+
+
+# -- loops over faces ----------------------------------------------------------------------------
+
+
+@compiled
+def interpolate(values: FloatArray, faces: IntArray, shapes: FloatArray, out: FloatArray) -> None:
+    """Write Y_K values_K at the points.
+
+    Parameters
+    ----------
+    values : shape (n, 3).
+    faces : shape (f, k).
+    shapes : shape (q, k).
+    out : shape (f q, 3).
+    """
+    count = shapes.shape[0]
+    for face in range(faces.shape[0]):
+        for q in range(count):
+            for i in range(3):
+                value = 0.0
+                for node in range(faces.shape[1]):
+                    value += shapes[q, node] * values[faces[face, node], i]
+                out[face * count + q, i] = value
+
+
+@compiled
+def farthest(points: FloatArray, others: FloatArray) -> float:
+    """Return the largest distance of points to others of the same number; NaN if one is."""
+    largest = 0.0
+    for point in range(points.shape[0]):
+        square = 0.0
+        for i in range(3):
+            square += (points[point, i] - others[point, i]) ** 2
+        if not square <= largest:
+            largest = square
+            if square != square:
+                break
+    return np.sqrt(largest)
+
+
+@compiled
+def spread(force: FloatArray, faces: IntArray, shapes: FloatArray, out: FloatArray) -> None:
+    """Add Y_K force, force of shape (f q, 3), to nodal forces, shape (n, 3), N."""
+    count = shapes.shape[0]
+    for face in range(faces.shape[0]):
+        for q in range(count):
+            for i in range(3):
+                value = force[face * count + q, i]
+                if value != 0.0:
+                    for node in range(faces.shape[1]):
+                        out[faces[face, node], i] += shapes[q, node] * value
+
+
+@compiled
+def add_matrices(
+    matrices: FloatArray,
+    touched: FloatArray,
+    shapes: FloatArray,
+    cells: IntArray,
+    local: IntArray,
+    out: FloatArray,
+) -> None:
+    """Add Y_K Y_L times the matrices of the points to element matrices.
+
+    Parameters
+    ----------
+    matrices : shape (f q, 3, 3), N/m.
+    touched : shape (f q,) -- whether there is anything to add.
+    shapes : shape (q, k).
+    cells, local : shapes (f,) and (f, k).
+    out : shape (m, 3k', 3k') with the k' nodes of the elements.
+    """
+    points, count, size = shapes.shape[0], shapes.shape[1], out.shape[1] // 3
+    for face in range(cells.shape[0]):
+        for q in range(points):
+            point = face * points + q
+            if not touched[point]:
+                continue
+            for node in range(count):
+                for other in range(count):
+                    weight = shapes[q, node] * shapes[q, other]
+                    for i in range(3):
+                        for j in range(3):
+                            row, column = (
+                                i * size + local[face, node],
+                                j * size + local[face, other],
+                            )
+                            out[cells[face], row, column] += weight * matrices[point, i, j]
