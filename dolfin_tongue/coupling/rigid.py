@@ -46,11 +46,6 @@ class RigidBodies(Coupling):
         """Displacement of all attached dofs, shape (k, 3), m."""
         return plane.displacement(self._every_arm, q.reshape(-1, 3)[self._owner])
 
-    def spread(self, q: FloatArray, size: int) -> Sparse:
-        """T as a sparse matrix from coordinates to mixed arrays, shape (size, 3b)."""
-        parts = zip(self._arms, self._at, strict=True)
-        return self._spread([plane.jacobian(arms, q[at]) for arms, at in parts], size)
-
     def _spread(self, blocks: list[FloatArray], size: int) -> Sparse:
         """Blocks of shape (k, 3, 3), body after body, as a sparse matrix."""
         rows, columns = [], []
@@ -129,20 +124,47 @@ class RigidBodies(Coupling):
             own[part.start + 2, part.start + 2] += np.sum(plane.bend(arms, q[part]) * rows[dofs])
         own[self._given] = 0.0
         own[self._given, self._given] = shifts.end
-        gathered = (self.spread(q, size).T @ matrix).tocsr()
-        gathered = sp.diags_array(1.0 - self._given) @ gathered
-        keep = np.ones(size)
-        keep[self.dofs] = keep[self.positions] = 0.0
-        nodes = shifts.end * (1.0 - keep)
-        nodes[self.positions] = 0.0
-        follow = -shifts.end * self.spread(self._own(at.end), size)
-        return (
-            sp.diags_array(keep) @ matrix
-            + self._placed(gathered, size)
-            + sp.diags_array(nodes)
-            + self._placed(follow.T, size).T
-            + scattered(self.positions[:, None], self.positions, own, size)
-        )
+        gathered = self._gathered(matrix, q)
+        gathered[self._given] = 0.0
+        follow = -shifts.end * self._jacobians(self._own(at.end))
+        return self._replaced(matrix) + self._entries(size, gathered, follow, own, shifts.end)
+
+    def _jacobians(self, q: FloatArray) -> FloatArray:
+        """T of all attached dofs, shape (k, 3, 3): component, then coordinate of its body."""
+        return plane.jacobian(self._every_arm, q.reshape(-1, 3)[self._owner])
+
+    def _gathered(self, matrix: Sparse, q: FloatArray) -> FloatArray:
+        """Rows of the nodes, times T^T, as rows of the coordinates; dense, shape (3b, size)."""
+        spread = np.zeros((self.dofs.size, len(q)))
+        rows = np.arange(self.dofs.size).reshape(-1, 3)
+        columns = 3 * self._owner[:, None, None] + np.arange(3)
+        spread[rows[:, :, None], columns] = self._jacobians(q)
+        return (matrix[self.dofs.ravel()].T @ spread).T
+
+    def _replaced(self, matrix: Sparse) -> Sparse:
+        """Matrix with empty rows of the nodes."""
+        keep = np.ones(matrix.shape[0])
+        keep[self.dofs] = 0.0
+        values = matrix.data * np.repeat(keep, np.diff(matrix.indptr))
+        return sp.csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+    def _entries(
+        self, size: int, gathered: FloatArray, follow: FloatArray, own: FloatArray, diagonal: float
+    ) -> Sparse:
+        """Rows of the coordinates, and those of the nodes that follow them."""
+        row, column = np.nonzero(gathered)
+        node, component, coordinate = np.nonzero(follow)
+        inner = np.nonzero(own)
+        dofs, at = self.dofs.ravel(), self.positions
+        rows = (at[row], self.dofs[node, component], dofs, at[inner[0]])
+        owner = at[3 * self._owner[node] + coordinate]
+        columns = (column, owner, dofs, at[inner[1]])
+        values = (
+            gathered[row, column], follow[node, component, coordinate],
+            np.full(dofs.size, diagonal), own[inner],
+        )  # fmt: skip
+        place = (np.concatenate(rows), np.concatenate(columns))
+        return sp.coo_array((np.concatenate(values), place), shape=(size, size)).tocsr()
 
     def energies(self, at: Arguments) -> dict[str, float]:
         """Kinetic energy of the bodies."""

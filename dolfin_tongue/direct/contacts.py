@@ -1,7 +1,7 @@
 """Contact with rigid obstacles by hand: nodal forces, tangents, energy, and what is to be seen.
 
 At each point of the faces in the reference configuration (some are nodes, see
-`FaceGroup.for_contact`) the position is x = Y_K (X^K + U^K) (43), the gap h(x - s) with the obstacle
+`FaceGroup.for_contact`) the position is x = Y_K (X^K + U^K) (43), the gap h(x - s) from an obstacle
 moved by s(t), its normal n = grad h, its curvature H = grad n and the rate h' = n.(v - s') (58),
 (59). With the traction t(h, h') of the law per reference area dA,
 
