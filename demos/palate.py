@@ -17,7 +17,7 @@ LEVELS = {"genioglossus_posterior": 1.0, "styloglossus": 0.6}
 def main(options: Options) -> dict[str, object]:
     """Run the demo; returns the numbers worth printing."""
     activation = {name: SmoothRamp(level, 0.0, 0.3) for name, level in LEVELS.items()}
-    scene = report_mouth(activation, ("palate",), options.refinement)
+    scene = report_mouth(activation, ("palate",), 2 * options.refinement)  # a patch needs cells
     print(f"tongue of {len(scene.body.cells)} elements under a palate")
     with progress_bar("simulated", END) as progress:
         run = simulate(

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from dolfin_tongue import view
-from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.boundary import Attached
+from dolfin_tongue.observe import contact_pressures
 from dolfin_tongue.run import Run
 from dolfin_tongue.state import State
+from dolfin_tongue.system import System
 from dolfin_tongue.view.plots import contact_names, rigid_names
 
 #: Frames on a contact sheet.
@@ -22,22 +23,19 @@ SHEET_FRAMES = 15
 PRESSURE_FRAMES = 8
 
 
-def picture_run(
-    run: Run, title: str, contact_pressure: Callable[[State], FloatArray] | None = None
-) -> None:
+def picture_run(run: Run, title: str) -> None:
     """Draw a run into its folder.
 
     ``sheet.png`` frames with nodes' velocities, ``animation.gif``, ``fibres/`` a picture of each
     muscle, ``trajectories.png``, ``energy.png``, ``shape.png`` the last shape. Walls that the body
     touches or slides on, and rigid bodies, are drawn with it. Where there are any:
-    ``contact.png`` forces and areas of contact, ``rigid.png`` coordinates of rigid bodies.
+    ``contact.png`` forces and areas of contact, ``pressure.png`` where the tissue is touched,
+    ``rigid.png`` coordinates of rigid bodies.
 
     Parameters
     ----------
     run : a finished run.
     title : over the sheet.
-    contact_pressure : pressure of contact at the nodes in a state, shape (n,), Pa; with it,
-        ``pressure.png`` shows where the tissue is touched.
     """
     body, folder = run.scene.body, run.folder
     frames = view.telling_frames(run.frames, SHEET_FRAMES)
@@ -55,12 +53,22 @@ def picture_run(
     view.energy_plot(steps, folder / "energy.png")
     if contact_names(steps):
         view.contact_plot(steps, folder / "contact.png")
+        _picture_pressures(run, title, steps)
     if rigid_names(places):
         view.rigid_plot(places, folder / "rigid.png")
-    if contact_pressure is not None:
-        chosen = view.telling_frames(run.frames, PRESSURE_FRAMES)
-        maps = [contact_pressure(state) for state in chosen]
-        view.contact_picture(body, chosen, maps, folder / "pressure.png", title=title)
+
+
+def _picture_pressures(run: Run, title: str, steps: dict[str, np.ndarray]) -> None:
+    """Draw the pressure of contact at some of the frames from the first touch on."""
+    touched = np.any([steps[name] > 0 for name in steps if name.endswith("_area_m2")], axis=0)
+    if not touched.any():
+        return
+    begin = steps["time_s"][touched][0]
+    frames = [frame for frame in run.frames if frame.time >= begin] or [run.last]
+    frames = view.telling_frames(frames, PRESSURE_FRAMES)
+    system = System(run.scene, dynamic=True)
+    maps = [np.sum(list(contact_pressures(system, x).values()), axis=0) for x in frames]
+    view.contact_picture(run.scene.body, frames, maps, run.folder / "pressure.png", title=title)
 
 
 def picture_shapes(body: Body, shapes: Mapping[str, State], path: Path) -> None:
