@@ -178,10 +178,12 @@ def boundaries(report: Report) -> None:
             label = f"block dropped on a {name} at {speed:g} m/s"
             outcome, _ = attempt_march(scene, 0.1, method, report.run_folder(label, method), start)
             report.add(label, method, outcome)
-    for distance, duration in ((0.01, 0.1), (0.02, 0.02)):
-        name = f"palate comes down by {1e3 * distance:g} mm in {1e3 * duration:g} ms"
+    for distance, duration, note in (
+        (0.006, 0.1, ""), (0.006, 0.02, ""), (0.01, 0.1, ", on a node that is held")
+    ):  # fmt: skip
+        name = f"palate comes down by {1e3 * distance:g} mm in {1e3 * duration:g} ms{note}"
         report.runs(name, contacts.closing_palate(distance, duration), 0.2)
-    for share, duration in ((0.5, 0.1), (1.0, 0.05)):
+    for share, duration in ((0.3, 0.1), (0.5, 0.05), (1.0, 0.05)):
         name = f"squeezed: mandible closes by {10 * share:g} degrees in {1e3 * duration:g} ms"
         report.runs(name, contacts.squeezed_tongue(share, duration), 0.25)
     for mass in (1e-3, 10.0):

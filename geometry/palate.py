@@ -3,9 +3,11 @@
 Frame as in `preliminary`: x from front to back, y to the sides, z up, metres. The palate is a vault
 over a plan: half an ellipse in front (the dental arch), a strip of constant width behind it. Across
 the plan, from the midline or the top of the vault outward, it is a quarter of an ellipse down to
-the gums, and then a wall straight down, the inside of the upper teeth. Behind the incisors the
-alveolar ridge stands out of it. Backwards the roof sinks to the edge of the velum, and the teeth
-end. gmsh meshes the plan rolled out to its true width; a formula lifts the nodes.
+the gums, then a wall straight down, the inside of the upper teeth. It goes on outward along their
+edges, so that a tongue between the teeth meets these and not the rim of a sheet. Behind the
+incisors the alveolar ridge stands out of the vault. Backwards the roof sinks to the edge of the
+velum, and the teeth end. gmsh meshes the plan rolled out to its true width; a formula lifts the
+nodes.
 """
 
 from __future__ import annotations
@@ -52,6 +54,7 @@ class Palate:
     height : of the vault over the gum line, m, > 0.
     half_width : from the midplane to the gum line beside the molars, m, > 0.
     teeth : height of the inside of the upper teeth below the gum line, m, > 0.
+    edge : how far the surface goes on outward from the edge of the teeth, m, > 0.
     teeth_end : x behind the last molar, m.
     ridge : how far the alveolar ridge stands out, m, >= 0.
     velum : x and z of the edge of the velum, m.
@@ -67,13 +70,14 @@ class Palate:
     height: float = 11.0 * mm
     half_width: float = 23.0 * mm
     teeth: float = 5.0 * mm
+    edge: float = 8.0 * mm
     teeth_end: float = 110.0 * mm
     ridge: float = 2.0 * mm
     velum: tuple[float, float] = (133.0 * mm, 99.0 * mm)
 
     def __post_init__(self) -> None:
-        lengths = {"height": self.height, "half_width": self.half_width, "teeth": self.teeth}
-        require_positive(self, "m", **lengths)
+        lengths = ("height", "half_width", "teeth", "edge")
+        require_positive(self, "m", **{name: getattr(self, name) for name in lengths})
         require_not_negative(self, "m", ridge=self.ridge)
         for name in ("top", "velum"):
             place = getattr(self, name)
@@ -95,8 +99,8 @@ class Palate:
         ----------
         along : ndarray, shape (k,) -- on the plan from its front, -1, over the top of the vault, 0,
             to the edge of the velum, 1.
-        out : ndarray, shape (k,) -- on the plan from the midplane, 0, to the edge of the teeth, 1;
-            in front of the top the plan is the half disc along^2 + out^2 <= 1.
+        out : ndarray, shape (k,) -- on the plan from the midplane, 0, to the edge of the teeth, 1,
+            and beyond; in front of the top the teeth end at along^2 + out^2 = 1.
 
         Returns
         -------
@@ -105,12 +109,13 @@ class Palate:
         front = np.minimum(along, 0.0)
         way = np.hypot(front, out)
         vault = np.minimum(way / self._gum_way, 1.0)
-        wall = np.maximum(way - self._gum_way, 0.0) / (1 - self._gum_way)
+        wall = np.clip((way - self._gum_way) / (1 - self._gum_way), 0.0, 1.0)
+        beyond = np.maximum(way - 1, 0.0) * self._side
         direction = np.stack([front, out]) / np.maximum(way, 1e-300)
         angle = vault * np.pi / 2
         x = self.top[0] + np.maximum(along, 0.0) * (self.velum[0] - self.top[0])
-        x += (self.top[0] - self.front) * direction[0] * np.sin(angle)
-        y = self.half_width * direction[1] * np.sin(angle)
+        x += ((self.top[0] - self.front) * np.sin(angle) + beyond) * direction[0]
+        y = (self.half_width * np.sin(angle) + beyond) * direction[1]
         roof, arch = self._section(x)
         z = roof - arch * (1 - np.cos(angle)) - self._teeth(x) * wall
         return np.stack([x, y, z], axis=1) - self._ridge(vault, direction)
@@ -146,7 +151,12 @@ class Palate:
     @property
     def _gum_way(self) -> float:
         """Part of the way from top to edge of the teeth at which the gum line lies."""
-        return self._arcs[1] / (self._arcs[1] + self.teeth)
+        return self._arcs[1] / self._side
+
+    @property
+    def _side(self) -> float:
+        """Length from the top of the vault to the edge of the teeth beside it, m."""
+        return self._arcs[1] + self.teeth
 
     def triangles(self, mesh_size: float = 1.5 * mm) -> tuple[FloatArray, IntArray]:
         """Mesh the palate by gmsh, mirror-symmetric about y = 0.
@@ -168,8 +178,9 @@ class Palate:
         if not (is_number(mesh_size) and 0 < mesh_size <= largest):
             raise OutOfRange("mesh_size", mesh_size, f"> 0 and at most {largest:.3g}", "m")
         front, side = (arc + self.teeth for arc in self._arcs)
+        wide = 1 + self.edge / side
         back = float(np.hypot(self.velum[0] - self.top[0], self.top[1] - self.velum[1]))
-        plan, half = _half_plan(front, side, back, mesh_size)
+        plan, half = _half_plan(wide * front, wide * side, back, mesh_size)
         along = np.where(plan[:, 0] < 0, plan[:, 0] / front, plan[:, 0] / back)
         points = self.surface(along, plan[:, 1] / side)
         return _mirrored(points, half, middle=plan[:, 1] < 1e-9 * side)
@@ -182,7 +193,7 @@ def report_palate(
 
     With the default measures no point of the surface of `preliminary_tongue` at rest is nearer to
     it than 1.8 mm; over the dorsum (x from 80 to 120 mm) the gap is 2.2 to 3.9 mm, behind the
-    incisors it is 2.6 mm or more. The tip at rest is lower than the edge of the teeth.
+    incisors it is 2.5 mm or more. The tip at rest is lower than the edge of the teeth.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.extremes import charts, peers, scenes
+from benchmarks.extremes import charts, contacts, peers, scenes
 from benchmarks.extremes.outcome import FILES, KEPT, attempt_alpha2, attempt_march, short_cause
 from dolfin_tongue import demo
 from dolfin_tongue.control import Ramp, Step
@@ -175,3 +175,20 @@ def test_the_benchmark_finds_no_fault(tmp_path):
     assert "0 faults" in table["faults"]["note"]
     for name in ("extremes.csv", "extremes.json", "map.csv", "stability.png", "table.md"):
         assert (tmp_path / name).stat().st_size > 0
+
+
+@pytest.mark.parametrize("method", BOTH, ids=IDS)
+@pytest.mark.parametrize(
+    "scene",
+    [
+        contacts.closing_palate(0.006, 0.02),
+        contacts.squeezed_tongue(0.5, 0.05),
+        contacts.weighed_mandible(1e-3),
+        contacts.weighed_mandible(10.0),
+        contacts.sliding_block(0.03, 50.0),
+        scenes.film_on_a_corner(0.073),
+    ],
+    ids=["closing", "squeezed", "light", "heavy", "sliding", "film"],
+)
+def test_boundaries_survive_extremes(scene, method, tmp_path):
+    assert_finished(attempt(scene, 0.12, method, tmp_path), 0.12)
