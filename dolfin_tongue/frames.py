@@ -18,7 +18,8 @@ from dolfin_tongue.state import State
 #: Fields of a frame: name, place, components.
 FIELDS = (("displacement", "Node", 3), ("velocity", "Node", 3), ("pressure", "Cell", 1))
 
-NO_BODIES = np.zeros((0, 3))
+#: Coordinates and rates of no rigid bodies.
+NO_BODIES = np.zeros((2, 0, 3))
 
 
 class Frames:
@@ -47,7 +48,8 @@ class Frames:
         for name, _, _ in FIELDS:
             write_array(self._path(f"{name}_{number:05d}"), getattr(state, name))
         if self.bones:
-            write_array(self._path(f"rigid_{number:05d}"), state.rigid)
+            both = np.stack([state.rigid, state.rigid_rate])
+            write_array(self._path(f"rigid_{number:05d}"), both)
         self.times.append(state.time)
         write_text(self.folder / "fields.xdmf", self._index())
 
@@ -63,13 +65,14 @@ class Frames:
         }
         shape, rigid = self.body.points.shape, NO_BODIES
         if self.bones:
-            rigid = np.fromfile(self._path(f"rigid_{number:05d}"), dtype="<f8").reshape(-1, 3)
+            rigid = np.fromfile(self._path(f"rigid_{number:05d}"), dtype="<f8").reshape(2, -1, 3)
         return State(
             self.times[number],
             arrays["displacement"].reshape(shape),
             arrays["velocity"].reshape(shape),
             arrays["pressure"],
-            rigid=rigid,
+            rigid=rigid[0],
+            rigid_rate=rigid[1],
         )
 
     def read_all(self) -> list[State]:

@@ -352,6 +352,7 @@ def test_runs_record_bones_and_resume(solver, tmp_path):
     assert np.array_equal(table["bone_angle_rad"][-1:], parts.last.rigid[:, 2])
     assert [len(frame.rigid) for frame in parts.frames] == [1] * 5
     assert parts.frames[-1].rigid == pytest.approx(parts.last.rigid)
+    assert parts.frames[-1].rigid_rate == pytest.approx(parts.last.rigid_rate)
     # The seam estimates the acceleration anew: an error of the method's order, not of a jump.
     assert parts.last.rigid[0, 2] == pytest.approx(whole.last.rigid[0, 2], rel=1e-3)
     assert abs(whole.last.rigid[0, 2]) > 0.1

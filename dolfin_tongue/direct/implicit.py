@@ -21,6 +21,12 @@ the end of the stage. So all momentum that leaves a node arrives at another one,
 keeps its linear momentum to round-off, turning or not. Newton's matrix gets a border with the T of
 the points and its turning (`border`). The drift of the constraints is taken out of the nodes alone.
 
+Contact: an impact that h does not resolve would be thrown back with energy of its own, as the first
+stage takes over the acceleration at t. A step in which the impulses of contact make energy, or
+after which a point is behind an obstacle (`impacts`), is taken again by Euler's implicit method,
+whose only stage stands at the end of the step: there a convex barrier gives back no more than it
+took. Only if that fails too is the step cut.
+
 Two ways to use it:
 - Newton to a tolerance, with the factors kept over iterations and steps while they serve;
 - linearly implicit (`corrections = 1`): one tangent per step, at the predicted inner stage, one
