@@ -7,10 +7,9 @@ share the dataclasses of the terms, of which only numbers are read here.
 
 Reading order: `elements` (shape functions, kappa) - `mesh` - `volume` (96), (101) - `tensors`,
 `isochoric`, `passive`, `rates` (stress and moduli at points) - `points` (element loops) - `faces`,
-`membranes` (47), `contacts` (58) - `forces` (which term has which law) - `model` (the semi-discrete equations, no
-dt) - `multipliers` (53)-(57) - `limits`, `impacts` (what contact may do in
-a step), `integrate` (explicit methods) - `saddle`, `implicit` -
-`balance`, `trouble`.
+`membranes` (47), `contacts` (58) - `forces` (which term has which law) - `model` (the semi-discrete
+equations, no dt) - `multipliers` (53)-(57) - `limits`, `impacts` (what contact may do in a step),
+`integrate` (explicit methods) - `saddle`, `implicit` - `balance`, `trouble`.
 
 Conventions
 -----------

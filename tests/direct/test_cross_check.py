@@ -17,7 +17,7 @@ from cases import TERMS, apply_matrices, name_of, random_body, random_state, rel
 import dolfin_tongue
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.direct import Model, problem_of
-from dolfin_tongue.direct.forces import LAWS, LOADS, MEMBRANES
+from dolfin_tongue.direct.forces import CONTACTS, LAWS, LOADS, MEMBRANES
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.term import Term
 
@@ -159,7 +159,8 @@ def concrete_terms() -> set[type[Term]]:
 def test_every_term_has_a_direct_counterpart_and_is_checked_here():
     terms = concrete_terms()
     assert terms, "no terms found"
-    missing = {item.__name__ for item in terms - set(LAWS) - set(LOADS) - set(MEMBRANES)}
+    direct = {*LAWS, *LOADS, *MEMBRANES, *CONTACTS}
+    missing = {item.__name__ for item in terms - direct}
     assert not missing, f"terms without a force in the direct solver: {missing}"
     unchecked = {item.__name__ for item in terms - {type(term) for term in TERMS}}
     assert not unchecked, f"terms that the cross-check leaves out: {unchecked}"

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cases import apply_matrices, mesh_model, mixed_mesh
+from cases import apply_matrices, mesh_model, mixed_mesh, random_body, relative
 
 from dolfin_tongue.body import Body
 from dolfin_tongue.boundary import Attached, Barrier, Contact, Gravity, ReportContact
@@ -84,6 +84,43 @@ def test_tangents_are_the_derivatives_of_the_force(term):
         assert np.abs(product - expected).max() <= 1e-7 * scale
     other: tuple[Term, ...] = ()
     assert not any(part.any() for part in model.element_tangents(TIME, u, v, 1.0, 1.0, other))
+
+
+def stated(term: Contact, body: Body, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Nodal forces as the definition has them, face by face and point by point."""
+    out = np.zeros_like(u)
+    shift, drift = term.shift(TIME)
+    for face in body.surface(term.surface):
+        for a in (-1, 1) / np.sqrt(3):
+            for b in (-1, 1) / np.sqrt(3):
+                Y = np.array([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b),
+                              (1 - a) * (1 + b)]) / 4  # fmt: skip
+                by_a = np.array([b - 1, 1 - b, 1 + b, -1 - b]) / 4 @ body.points[face]
+                by_b = np.array([a - 1, -1 - a, 1 + a, 1 - a]) / 4 @ body.points[face]
+                area = np.linalg.norm(np.cross(by_a, by_b))
+                gap = term.obstacle.gap((Y @ (body.points + u)[face] - shift)[None])
+                rate = gap.normal[0] @ (Y @ v[face] - drift)
+                traction, *_ = term.law.traction(gap.distance, np.array([rate]))
+                out[face] += area * traction * Y[:, None] * gap.normal
+    return out
+
+
+@pytest.mark.parametrize("surface", ["z0", "boundary"])
+@pytest.mark.parametrize("term", CONTACTS, ids=name_of_contact)
+def test_the_force_is_as_defined(term, surface):
+    body = random_body()
+    nearest = term.obstacle.gap(body.points).distance.min() - 1.5e-3
+    if isinstance(term.obstacle, Plane):
+        point = np.array(PLANE.point) + nearest * PLANE.gradient(body.points)[0]
+        moved = replace(PLANE, point=tuple(point))
+    else:
+        moved = replace(BALL, radius=BALL.radius + nearest)
+    term = replace(term, surface=surface, obstacle=moved)
+    model = Direct(Scene(body, (term,)), Implicit()).model
+    u, v = touching_state(model)
+    expected = stated(term, body, u, v)
+    assert np.abs(expected).max() > 0
+    assert relative(model.force(TIME, u, v), expected) <= 1e-12
 
 
 # -- motions -------------------------------------------------------------------------------------
