@@ -7,9 +7,10 @@ share the dataclasses of the terms, of which only numbers are read here.
 
 Reading order: `elements` (shape functions, kappa) - `mesh` - `volume` (96), (101) - `tensors`,
 `isochoric`, `passive`, `rates` (stress and moduli at points) - `points` (element loops) - `faces`,
-`membranes` (47) - `forces` (which term has which law) - `model` (the semi-discrete equations, no
-dt), with `slides` (49)-(52) and `bodies` (61), (62) - `multipliers` (53)-(57) - `limits`,
-`integrate` (explicit methods) - `saddle`, `border`, `implicit` - `balance`, `trouble`.
+`membranes` (47), `contacts` (58) - `forces` (which term has which law) - `model` (the semi-discrete
+equations, no dt), with `slides` (49)-(52) and `bodies` (61), (62) - `multipliers` (53)-(57) -
+`limits`, `impacts` (what contact may do in a step), `integrate` (explicit methods) - `saddle`,
+`border`, `implicit` - `balance`, `trouble`.
 
 Conventions
 -----------
@@ -30,6 +31,8 @@ Choosing a method
   the one for production. `Implicit(corrections=1)` is its linearly implicit form.
 - `Adaptive`: an explicit pair with tight error control, for references.
 - `RungeKutta4`: the report's, fixed step, order 4, refused beyond its stability limit.
+- With contact: `Implicit` (impacts inelastic); `RungeKutta4(cut=True)` or `Adaptive` resolve the
+  elastic rebound, with steps of some microseconds.
 """
 
 from dolfin_tongue.direct.balance import drift, momentum

@@ -108,6 +108,13 @@ class Obstacle:
             self._seen, self._clear = places, float(gap.distance.min()) - self.term.law.range
         return near, Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
 
+    def clipped_gaps(self, time: float, x: FloatArray) -> FloatArray:
+        """Gaps of all points, at most the range, shape (k,), m."""
+        near, gap = self._near(time, x)
+        out = np.full(len(self.areas), self.term.law.range)
+        out[near] = gap.distance
+        return out
+
     def smallest_gap(self, time: float, x: FloatArray) -> float:
         """Smallest gap within the range of the law, m; inf if there is none."""
         near, gap = self._near(time, x)

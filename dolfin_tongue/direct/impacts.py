@@ -24,6 +24,8 @@ from dolfin_tongue.errors import BadScene
 #: Energy that contact may make by errors of a method, over the largest energy so far, kinetic and
 #: stored in contacts.
 GAIN = 1e-2
+#: Factor by which a gap within the range may change in a step of an explicit method.
+LEAP = 2.0
 #: Time after which that is forgotten, s, so that a body that presses for long is not refused.
 MEMORY = 0.1
 
@@ -164,6 +166,16 @@ class Impacts:
         x = self.model.position(u)
         return kinetic + sum(obstacle.energy(time, x) for obstacle in self.obstacles)
 
+    def _leaps(self, stages: Sequence[tuple[float, FloatArray, FloatArray]]) -> str:
+        """Where a gap changes too much from the first stage to be resolved; empty if nowhere."""
+        for obstacle in self.obstacles:
+            if obstacle.impassable:
+                gaps = [obstacle.clipped_gaps(t, self.model.mesh.points + u) for t, u, _ in stages]
+                least, most = np.min(gaps, axis=0), np.max(gaps, axis=0)
+                if not (most <= LEAP * least).all():
+                    return f"a gap would change by more than a factor {LEAP:g}; {obstacle.name}"
+        return ""
+
     def explicit(
         self,
         h: float,
@@ -176,6 +188,8 @@ class Impacts:
             raise Refused(cause)
         if not (self.near(*new[:2]) or self.near(*stages[0][:2])):
             return
+        if cause := self._leaps([*stages, new]):
+            raise Refused(cause)
         parts = [self.instant(*stage) for stage in stages]
         weighted = list(zip(weights, parts, strict=True))
         if cause := self.judge(h, parts[0], self.instant(*new), weighted):

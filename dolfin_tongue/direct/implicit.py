@@ -32,6 +32,26 @@ Two ways to use it:
 - linearly implicit (`corrections = 1`): one tangent per step, at the predicted inner stage, one
   linear solve per stage, no iteration. Order 2 is kept, since predictions are of order 2.
 
+Contact. TR-BDF2 states an impact wrongly: a free point that meets a wall at speed v leaves it at up
+to 1.41 v, since the trapezoidal stage reflects v and BDF2 extrapolates the jump. So each step is
+judged by the energy that contact makes in it (`impacts`). Where that is more than an error, or a
+point passes an obstacle, or Newton's method fails near one, the step is taken again by Euler's
+implicit method, whose contact force is that of the end of the step: for a convex barrier
+psi_1 - psi_0 <= psi'(h_1) (h_1 - h_0), so that impact is inelastic and no energy is made. What then
+still fails is cut. Near obstacles stages are always iterated. Blocks of 27 bricks dropped on a
+plane, flat and on a corner, at 0.1 and 1 m/s with dt = 5 and 1 ms, 8 runs of 60 ms together, and a
+plate that moves by 2 mm from 1 mm away in 50 ms (error of the displacement, dt = 1.25 ms):
+
+                                          steps   solves   factors   error
+    as it is                                300     2406       333   0.4 %
+    Euler's in every step with contact      301     2908       949   3.4 %
+    cut to change gaps by at most 1/2      1140     9999      2163
+    cut to change gaps by at most 1/5      2914    17964      5702
+
+With cuts upon failure alone one such drop gained 44 % of its kinetic energy. No drop gained any as
+it is, nor did any of 48 (0.1 to 2 m/s, with and without viscosity, both laws). Order 2 is kept
+where contact is smooth; an impact is of order 1 and loses what dt does not resolve.
+
 Both measure 1.99 to 2.01 in displacement, velocity and pressure (`tests/direct/test_order.py`). The
 report's tongue (42 bricks, two muscles, 50 Pa s; `pytest -m slow -s tests/direct/test_tongue.py`,
 one core) at dt = 5 and 10 ms errs by 0.09 and 0.36 % of the largest displacement; an iteration
