@@ -53,6 +53,8 @@ def contact_pressures(system: System, state: State) -> dict[str, FloatArray]:
     y, rate = system.vectors(state)
     system.set_state(state.time, y, rate, np.zeros_like(rate), y)
     at = system.arguments(state.time)
+    for coupling in system.couplings:
+        coupling.begin(state.time, y)
     parts = [part for part in system.couplings if isinstance(part, ContactSurface)]
     return {part.label: part.pressure_map(at) for part in parts}
 
@@ -179,6 +181,9 @@ class EnergyAudit:
         -------
         dict -- energies and works so far, and the balance error, J.
         """
+        for coupling in self._couplings:
+            before = self._before or state
+            coupling.begin(before.time, self._system.vectors(before)[0])
         jump = state.time in self._jumps
         power = self.powers(state, nextafter(state.time, -inf) if jump else state.time)
         if self._before is not None:

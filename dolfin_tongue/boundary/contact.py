@@ -14,7 +14,7 @@ from dolfin_tongue.control.motion import Motion
 from dolfin_tongue.errors import BadScene, OutOfRange, require_positive
 from dolfin_tongue.faces import BOUNDARY
 from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.surfaces.base import Surface
+from dolfin_tongue.surfaces.base import Gap, Surface
 from dolfin_tongue.term import Fields, Term
 
 
@@ -126,6 +126,20 @@ class ReportContact(ContactLaw):
         by_gap = -2 * self.a1 * self.a2 * depth ** (self.a2 - 1) * (depth > 0) * speed
         by_rate = -near * self.a3 * closing ** (self.a3 - 1) * (closing > 0)
         return near * speed, by_gap, by_rate
+
+
+def in_front(gap: Gap, behind: FloatArray) -> Gap:
+    """Gap without the points that were behind a sheet before and still are; inf for them.
+
+    A point that comes up behind a rim is all at once deep in the wall by its signed distance.
+    """
+    gone = behind & (gap.distance <= 0)
+    if not gone.any():
+        return gap
+    return Gap(
+        np.where(gone, np.inf, gap.distance), np.where(gone[:, None], 0.0, gap.normal),
+        np.where(gone[:, None, None], 0.0, gap.curvature),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,9 @@ class Coupling(ABC):
         rows : the residual of what came before this part.
         """
 
+    def begin(self, time: float, y: FloatArray) -> None:
+        """Take notice of the state in which a step begins; not of what is tried within it."""
+
     def settled(self, residual: FloatArray) -> bool:
         """Whether the own rows of a residual are small enough to stop Newton's method."""
         return True

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.boundary.contact import Contact
+from dolfin_tongue.boundary.contact import Contact, in_front
 from dolfin_tongue.coupling.base import Arguments, Coupling, Shifts, Sparse
 from dolfin_tongue.mesh import MixedSpace
 from dolfin_tongue.surfaces.base import Gap
@@ -49,7 +49,6 @@ class Watched:
     ----------
     u, shift, margin : unknowns of the surface and place of the obstacle when it was made; m.
     points : numbers of the points.
-    places : their reference positions, m.
     moves, gathers : from unknowns to their displacements, and from forces on them to rows.
     """
 
@@ -57,7 +56,6 @@ class Watched:
     shift: FloatArray
     margin: float
     points: IntArray
-    places: FloatArray
     moves: Sparse
     gathers: Sparse
 
@@ -78,18 +76,26 @@ class ContactSurface(Coupling):
         #: How far a point may move when no unknown moves farther than 1.
         self._reach = float(np.sqrt(3) * np.abs(self._moves).sum(axis=1).max())
         self._watched: Watched | None = None
+        self._behind = np.zeros(len(self.points), dtype=bool)
 
     # -- state at the points -------------------------------------------------------------------
 
     def gap(self, time: float, y: FloatArray) -> Gap:
         """Gap of all points at a displacement."""
-        return self._gap(self.points, self._moves, time, y)
+        return self._gap(slice(None), self._moves, time, y)
 
-    def _gap(self, places: FloatArray, moves: Sparse, time: float, y: FloatArray) -> Gap:
-        x = places + (moves @ y[: self._size]).reshape(-1, 3)
+    def _gap(self, points: IntArray | slice, moves: Sparse, time: float, y: FloatArray) -> Gap:
+        x = self.points[points] + (moves @ y[: self._size]).reshape(-1, 3)
         if self.term.motion is not None:
             x -= self.term.shift(time)[0]
-        return self.term.obstacle.gap(x)
+        return in_front(self.term.obstacle.gap(x), self._behind[points])
+
+    def begin(self, time: float, y: FloatArray) -> None:
+        """Note which points are behind a sheet or beyond its reach; it does not stop them there."""
+        if self.term.obstacle.has_rim:
+            self._behind[:] = False
+            distance = self.gap(time, y).distance
+            self._behind = ~((distance > 0) & np.isfinite(distance))
 
     def watched(self, time: float, y: FloatArray) -> Watched:
         """Points that can be in range at a displacement."""
@@ -108,8 +114,7 @@ class ContactSurface(Coupling):
         points = np.flatnonzero(~far)
         moves = self._moves[_rows(points)]
         self._watched = Watched(
-            u, self.term.shift(time)[0], margin, points, self.points[points], moves,
-            moves.T.tocsr(),
+            u, self.term.shift(time)[0], margin, points, moves, moves.T.tocsr()
         )  # fmt: skip
         return self._watched
 
@@ -118,7 +123,7 @@ class ContactSurface(Coupling):
         watched = self.watched(time, y)
         if not watched.points.size:
             return watched, *NOWHERE
-        gap = self._gap(watched.places, watched.moves, time, y)
+        gap = self._gap(watched.points, watched.moves, time, y)
         near = np.flatnonzero(~(gap.distance >= self.term.law.range))
         if not near.size:
             return watched, *NOWHERE
@@ -199,7 +204,7 @@ class ContactSurface(Coupling):
         watched, near, _ = self._near(time, before)
         if not near.size:
             return ""
-        now = self._gap(watched.places[near], watched.moves[_rows(near)], time, y).distance
+        now = self._gap(watched.points[near], watched.moves[_rows(near)], time, y).distance
         leaps = (now > LEAP * law.range) & np.isfinite(now)  # over a rim a point may go
         return f"a leap off the obstacle at {self.label}" if leaps.any() else ""
 

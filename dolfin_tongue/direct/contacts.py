@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.boundary.contact import Contact
+from dolfin_tongue.boundary.contact import Contact, in_front
 from dolfin_tongue.direct.faces import FaceGroup
 from dolfin_tongue.direct.jit import compiled
 from dolfin_tongue.direct.membranes import base_vectors, determinant
@@ -71,6 +71,7 @@ class Obstacle:
         ends = np.cumsum([0, *(len(group.faces) * len(group.kind.weights) for group in groups)])
         self.slices = [slice(a, b) for a, b in pairwise(ends)]
         self._seen = np.zeros((len(self.areas), 3))
+        self._behind = np.zeros(len(self.areas), dtype=np.bool_)
 
     @property
     def name(self) -> str:
@@ -89,6 +90,12 @@ class Obstacle:
             interpolate(values, group.faces, group.kind.shapes, out[part])
         return out
 
+    def begin(self, time: float, x: FloatArray) -> None:
+        """Note which points are behind a sheet, or beyond its reach, where a step begins."""
+        if self.term.obstacle.has_rim:
+            distance = self.term.obstacle.gap(self._places(time, x)).distance
+            self._behind = ~((distance > 0) & np.isfinite(distance))
+
     def _places(self, time: float, x: FloatArray) -> FloatArray:
         """Positions of the points against the obstacle for nodes at x, shape (n, 3), m."""
         return self.at_points(x) - self.term.shift(time)[0]
@@ -102,7 +109,7 @@ class Obstacle:
         places = self._places(time, x)
         if farthest(places, self._seen) < self._clear:
             return NOWHERE
-        gap = self.term.obstacle.gap(places)
+        gap = in_front(self.term.obstacle.gap(places), self._behind)
         near = np.flatnonzero(~(gap.distance >= self.term.law.range))  # a NaN is to be noticed
         if not near.size and np.isfinite(gap.distance).all():
             self._seen, self._clear = places, float(gap.distance.min()) - self.term.law.range
@@ -180,6 +187,7 @@ class Obstacle:
     def touch(self, time: float, displacement: FloatArray, velocity: FloatArray) -> Touch:
         """Area, resultant, largest traction and smallest gap at a state."""
         gap = self.term.obstacle.gap(self._places(time, self.points + displacement))
+        gap = in_front(gap, self._behind)
         near = np.flatnonzero(gap.distance < self.term.law.range)
         part = Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
         traction, _, _ = self._law(part, self._relative(time, velocity, near))

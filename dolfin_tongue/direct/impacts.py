@@ -98,6 +98,7 @@ class Impacts:
         """Take a state as a new beginning; BadScene where it is behind an obstacle."""
         if not self.obstacles:
             return
+        self.model.begin_step(time, u)
         if cause := self.passed(time, u):
             raise BadScene(f"t = {time:.6g} s, the beginning: {cause}")
         self._largest = max(self._largest, self._energy(time, u, v))
@@ -170,7 +171,7 @@ class Impacts:
         """Where a gap changes too much from the first stage to be resolved; empty if nowhere."""
         for obstacle in self.obstacles:
             if obstacle.impassable:
-                gaps = [obstacle.clipped_gaps(t, self.model.mesh.points + u) for t, u, _ in stages]
+                gaps = [obstacle.clipped_gaps(t, self.model.position(u)) for t, u, _ in stages]
                 least, most = np.min(gaps, axis=0), np.max(gaps, axis=0)
                 if not (most <= LEAP * least).all():
                     return f"a gap would change by more than a factor {LEAP:g}; {obstacle.name}"

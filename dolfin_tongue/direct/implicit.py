@@ -214,6 +214,7 @@ class ImplicitStepper:
         """Take one step of at most dt; cut it where Newton fails or the error is too large."""
         smallest, _ = self.method.step_limits
         iterations = self.iterations
+        self.model.begin_step(state.time, self._now.u)
         while True:
             remaining = end - state.time
             time = end if dt >= remaining * (1 - 1e-12) else state.time + dt

@@ -244,6 +244,7 @@ class RungeKutta4Stepper:
     def _step(self, state: State, dt: float, time: float, end: float) -> State:
         """One step; the pressure is that of the new state."""
         (u, v, a1), t = self._now, state.time
+        self.model.begin_step(t, u)
         with np.errstate(all="ignore"):
             u2, v2 = self._held(t + dt / 2, u + dt / 2 * v, v + dt / 2 * a1)
             a2, _ = self.acceleration(before(t + dt / 2, end), u2, v2)
@@ -342,6 +343,8 @@ class AdaptiveStepper:
         solver = self._solver(state, end)
         while solver.status == "running":
             with np.errstate(all="ignore"):
+                if self.model.obstacles:
+                    self.model.begin_step(solver.t, self._spread(solver.t, solver.y)[0])
                 message = solver.step()
             finite = np.isfinite(solver.y).all()
             if solver.status == "failed" or not finite:

@@ -339,6 +339,11 @@ class Model:
             force -= self.mass @ acceleration
         return self.bodies.forces(u, self.whole(force))
 
+    def begin_step(self, time: float, displacement: FloatArray) -> None:
+        """Let the obstacles take notice of the state in which a step begins."""
+        for _, obstacle in self.obstacles:
+            obstacle.begin(time, self.position(displacement))
+
     def position(self, displacement: FloatArray) -> FloatArray:
         """Positions of the nodes, shape (n, 3), m."""
         return self.mesh.points + displacement[: len(self.mesh.points)]

@@ -268,6 +268,8 @@ class Dynamics:
         """Take one step of at most dt, cutting it where Newton fails or the error is too large."""
         iterations = self.newton.iterations
         self._begin = begin = self._snapshot()
+        for part in self.system.couplings:
+            part.begin(state.time, begin[0])
         rolled_back = False
         while True:
             self.ts.setTimeStep(dt)

@@ -81,7 +81,7 @@ class Statics:
         while factor < 1.0:
             increment = min(increment, 1.0 - factor)
             target = 1.0 if factor + increment > 1 - 1e-12 else factor + increment
-            converged, iterations = self._solve(target, accepted + slope * increment)
+            converged, iterations = self._solve(target, accepted, accepted + slope * increment)
             if converged:
                 reached = self._solution.array_r.copy()
                 slope, accepted = (reached - accepted) / increment, reached
@@ -102,9 +102,11 @@ class Statics:
             last = state
         return last
 
-    def _solve(self, factor: float, guess: np.ndarray) -> tuple[bool, int]:
+    def _solve(self, factor: float, accepted: np.ndarray, guess: np.ndarray) -> tuple[bool, int]:
         """One Newton solve at a load factor; (converged, iterations)."""
         self.system.load.value = factor
+        for part in self.system.couplings:
+            part.begin(self.time, accepted)
         self._solution.array_w[:] = guess
         self.newton.renew()
         try:

@@ -30,6 +30,11 @@ class Gap:
 class Surface(ABC):
     """A fixed rigid surface, given by an implicit function g that grows towards its free side."""
 
+    @property
+    def has_rim(self) -> bool:
+        """Whether a body can get behind it round a rim without passing it."""
+        return False
+
     @abstractmethod
     def value(self, points: FloatArray) -> FloatArray:
         """Return g at points of shape (k, 3), m; shape (k,), zero on the surface (49)."""

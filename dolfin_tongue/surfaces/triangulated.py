@@ -102,6 +102,11 @@ class Triangulated(Surface):
     offset: float = 0.0
     retraction: Retraction | None = None
 
+    @property
+    def has_rim(self) -> bool:
+        """Whether it is an open sheet."""
+        return self.sheet
+
     def __post_init__(self) -> None:
         name = type(self).__name__
         object.__setattr__(self, "points", real_numbers(f"{name}: points", self.points))

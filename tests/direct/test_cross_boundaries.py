@@ -150,3 +150,32 @@ def test_motions_converge_to_each_other(make):
         gaps.append(max(float(np.abs(last.displacement - fine.displacement).max()), turn))
     assert min(orders(steps, gaps)) > 1.8, gaps
     assert gaps[-1] < 1e-3 * np.abs(fine.displacement).max()
+
+
+@pytest.mark.parametrize("solver", ["fenicsx", "direct"])
+def test_a_body_may_come_up_behind_the_rim_of_a_sheet(solver, tmp_path):
+    """A block falls from above a wall's rim to behind the wall, and goes on as if it were not there."""
+    from dolfin_tongue.pictures import read_table
+    from dolfin_tongue.run import simulate
+    from dolfin_tongue.solve.dynamics import TimeSteps
+    from dolfin_tongue.surfaces import Triangulated
+
+    body = block_body((0.02, 0.02, 0.02), (2, 2, 2))
+    # The free side of the wall is away from the block, half a millimetre beside its face y1.
+    x, z = np.meshgrid(np.linspace(-0.01, 0.03, 21), np.linspace(-0.03, -0.012, 10), indexing="ij")
+    points = np.stack([x.ravel(), np.full(x.size, 0.0205), z.ravel()], axis=1)
+    place = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]
+    triangles = np.concatenate(
+        [np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, c, b), (a, d, c))]
+    )
+    wall = Triangulated(points, triangles, sheet=True, spacing=1e-3, band=6e-3, smoothing=0.0)
+    gap = wall.gap(np.array([[0.01, 0.02, -0.02], [0.01, 0.021, -0.02], [0.01, 0.02, 0.0]]))
+    assert gap.distance[0] < 0 < gap.distance[1] < gap.distance[2] == np.inf
+    scene = Scene(body, (MooneyRivlin(), Viscosity(20.0), Gravity(), Contact(wall, "y1")))
+    steps = TimeSteps(5e-3) if solver == "fenicsx" else Implicit(5e-3)
+    run = simulate(scene, 0.08, tmp_path, steps)
+    fallen = run.last.displacement[:, 2]
+    assert np.abs(fallen + 0.5 * 9.81 * 0.08**2).max() < 1e-5
+    table = read_table(tmp_path / "steps.csv")
+    assert table["contact_gap_m"].min() > 0
