@@ -157,6 +157,8 @@ class Recorder:
             self.frames.read_all()
             self.trajectories.continue_until(state.time)
             self.steps.continue_until(state.time)
+        except BadScene:  # another scene; it is a ValueError too
+            raise
         except _DAMAGED as error:
             raise BadScene(
                 f"the run in {self.folder} cannot be resumed, its files are damaged ({error}); "

@@ -11,6 +11,7 @@ from dolfin_tongue.boundary.contact import Barrier, ReportContact
 from dolfin_tongue.boundary.sliding import Sliding, moved_onto
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.control import Ramp, Recorded, SmoothMove, Still
+from dolfin_tongue.direct.integrate import RungeKutta4
 from dolfin_tongue.errors import BadMesh, BadScene, OutOfRange, UnknownName
 from dolfin_tongue.geometry.palate import Palate, report_palate
 from dolfin_tongue.geometry.simple import block_body
@@ -24,9 +25,19 @@ from dolfin_tongue.rigid import (
     Spring,
     StateForce,
 )
+from dolfin_tongue.run import simulate
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.scenes import published_mouth, report_mouth
-from dolfin_tongue.surfaces import Cylinder, Implicit, Plane, Sphere, Triangulated, facing, overlap
+from dolfin_tongue.surfaces import (
+    Cylinder,
+    Implicit,
+    Plane,
+    Sphere,
+    Triangulated,
+    facing,
+    overlap,
+    read_surface,
+)
 
 ORIGIN, FAR = (0.0, 0.0, 0.0), (0.0, 0.0, 0.1)
 BODY = block_body((0.03, 0.01, 0.01), (3, 1, 1))
@@ -225,6 +236,24 @@ def test_runs_with_other_functions_are_other_runs(monkeypatch):
     before = key(by_name)
     monkeypatch.setitem(globals(), "LEVEL", 0.02)
     assert key(by_name) != before
+
+
+def test_another_scene_is_not_called_a_damaged_file(tmp_path):
+    def run(depth, resume):
+        scene = Scene(BODY, (*TISSUE, Contact(Plane((0, 0, -depth)))), (Attached("x0"),))
+        return simulate(scene, 1e-4, tmp_path, RungeKutta4(5e-5), resume=resume)
+
+    run(1e-3, resume=False)
+    assert run(1e-3, resume=True).last.time == 1e-4
+    with pytest.raises(BadScene, match=r"^(?!.*damaged).*holds a run of another scene"):
+        run(2e-3, resume=True)
+
+
+def test_a_file_that_names_missing_points(tmp_path):
+    file = tmp_path / "surface.obj"
+    file.write_text("v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\nf 1 2 99\n", encoding="utf-8")
+    with pytest.raises(BadMesh, match=r"triangle\(s\) 1 name points that the file does not have"):
+        read_surface(file, sheet=True)
 
 
 def test_moves_that_are_good_stay_so():
