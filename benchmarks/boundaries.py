@@ -87,7 +87,8 @@ def mouth(parts=SURROUNDINGS):
     """Return the report's tongue in the mouth, pressed to the palate while the mandible opens."""
     levels = {"genioglossus_posterior": 1.0, "styloglossus": 0.6}
     activation = {name: SmoothRamp(level, 0.0, 0.1) for name, level in levels.items()}
-    return report_mouth(activation, parts, motion=opening(0.2, 0.2))
+    motion = opening(0.2, 0.2) if "mandible" in parts else None
+    return report_mouth(activation, parts, motion=motion)
 
 
 def agreement():

@@ -14,7 +14,10 @@ IntArray: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 
 def whole_numbers(what: str, value: Any) -> IntArray:
     """Array of node or cell numbers; BadMesh for anything that only looks like numbers."""
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise BadMesh(f"{what} must be a regular array of whole numbers: {error}") from error
     if array.dtype.kind not in "iu":
         mask = array.dtype.kind == "b"
         hint = "a mask? use np.flatnonzero(mask)" if mask else "use whole numbers"

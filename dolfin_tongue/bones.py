@@ -11,6 +11,7 @@ from __future__ import annotations
 from math import radians
 
 from dolfin_tongue.control import Control, Motion, SmoothMove, Still
+from dolfin_tongue.errors import OutOfRange, is_number
 from dolfin_tongue.rigid import AngularSpring, LineMuscle, RigidBody, RigidForce, Spring
 
 #: Centre of the condyles, about which the mandible turns, m.
@@ -32,6 +33,8 @@ def opening(start: float = 0.0, duration: float = 0.2, share: float = 1.0) -> di
     start, duration : s.
     share : of 10 degrees; negative closes.
     """
+    if not is_number(share):
+        raise OutOfRange("share", share, "a finite number")
     x, z = GLIDE
     return {
         "x": SmoothMove(share * x, start, duration),

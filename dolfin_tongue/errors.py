@@ -7,6 +7,8 @@ from math import isfinite
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
 
 class TongueError(Exception):
     """Base of all errors that dolfin_tongue raises on purpose."""
@@ -96,6 +98,13 @@ def listing(items: Iterable[Any], limit: int = 20) -> str:
 def is_number(value: Any) -> bool:
     """Whether a value is a finite real number (no text, no truth value, no array)."""
     return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
+
+
+def require_flags(owner: object, **flags: Any) -> None:
+    """Raise OutOfRange unless every value is True or False: the text "no" would count as yes."""
+    for name, value in flags.items():
+        if not isinstance(value, bool | np.bool_):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", repr(value), "True or False")
 
 
 def require_positive(owner: object, unit: str, **numbers: Any) -> None:

@@ -9,8 +9,10 @@ import json
 import zipfile
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import partial
 from numbers import Real
 from pathlib import Path
+from types import CodeType, FunctionType, MethodType
 from typing import Any, Literal, TextIO
 
 import numpy as np
@@ -155,6 +157,8 @@ class Recorder:
             self.frames.read_all()
             self.trajectories.continue_until(state.time)
             self.steps.continue_until(state.time)
+        except BadScene:  # another scene; it is a ValueError too
+            raise
         except _DAMAGED as error:
             raise BadScene(
                 f"the run in {self.folder} cannot be resumed, its files are damaged ({error}); "
@@ -195,6 +199,13 @@ def fingerprint(scene: Scene) -> str:
     return digest.hexdigest()
 
 
+def _numbers_of_module(function: FunctionType) -> dict[str, Any]:
+    """Return the numbers, arrays and tuples of a function's module that it uses by name."""
+    known = function.__globals__
+    used = {name: known[name] for name in function.__code__.co_names if name in known}
+    return {n: value for n, value in used.items() if isinstance(value, Real | np.ndarray | tuple)}
+
+
 def _feed(digest: Any, value: Any) -> None:
     """Feed a value to a hash by its contents: fields, arrays, numbers, code of functions."""
     if isinstance(value, np.ndarray):
@@ -210,10 +221,17 @@ def _feed(digest: Any, value: Any) -> None:
             _feed(digest, item)
     elif isinstance(value, Real) and not isinstance(value, bool):
         digest.update(repr(float(value)).encode())
-    elif hasattr(value, "__code__"):
-        digest.update(value.__code__.co_code + repr(value.__code__.co_consts).encode())
-        closure = value.__closure__ or ()
-        _feed(digest, (value.__defaults__, [cell.cell_contents for cell in closure]))
+    elif isinstance(value, partial):
+        _feed(digest, (value.func, value.args, value.keywords))
+    elif isinstance(value, MethodType):
+        _feed(digest, (value.__func__, value.__self__))
+    elif isinstance(value, FunctionType):
+        closure = [cell.cell_contents for cell in value.__closure__ or ()]
+        _feed(digest, (value.__code__, value.__defaults__, value.__kwdefaults__, closure))
+        _feed(digest, _numbers_of_module(value))
+    elif isinstance(value, CodeType):
+        digest.update(value.co_code + repr(value.co_names).encode())
+        _feed(digest, value.co_consts)
     elif hasattr(value, "__dict__"):
         digest.update(type(value).__qualname__.encode())
         _feed(digest, vars(value))

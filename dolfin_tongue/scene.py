@@ -13,6 +13,7 @@ from dolfin_tongue.body import Body
 from dolfin_tongue.boundary.gravity import Gravity
 from dolfin_tongue.boundary.sliding import Sliding
 from dolfin_tongue.errors import BadScene, UnknownName, listing
+from dolfin_tongue.loose import loose_parts
 from dolfin_tongue.rigid.body import RigidBody
 from dolfin_tongue.rigid.forces import SKULL, Line
 from dolfin_tongue.term import EnergyTerm, Held, Support, Term
@@ -153,8 +154,14 @@ class Scene:
         loose = [part.nodes(self.body) for part in (*self.sliding, *self._free_bodies)]
         for piece in range(number):
             if any((pieces[nodes] == piece).any() for nodes in loose):
-                continue  # whether it is held, only the equations can tell
+                continue  # see loose_parts
             self._check_held(self.held_nodes[pieces[self.held_nodes] == piece], number)
+        if loose and (found := loose_parts(self, pieces)):
+            raise BadScene(
+                f"a static problem needs supports that hold everything: nothing resists a rigid "
+                f"motion of {' with '.join(found)}. Add Attached(region), a spring to the skull, "
+                "or Still() as the motion of a coordinate; or run the scene in time"
+            )
 
     @property
     def _free_bodies(self) -> tuple[RigidBody, ...]:

@@ -14,7 +14,7 @@ from dolfin_tongue.bones import hyoid, mandible
 from dolfin_tongue.boundary import Attached, Contact, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, MooneyRivlin, ReportTissue, Viscosity
 from dolfin_tongue.control import Control, Motion
-from dolfin_tongue.errors import UnknownName
+from dolfin_tongue.errors import BadScene, UnknownName
 from dolfin_tongue.geometry.palate import report_palate
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
@@ -94,7 +94,13 @@ def report_mouth(
     refinement : elements per edge of each of the 42.
     motion : prescribed motion of the mandible, see `bones.opening`; default: it is free.
     geniohyoid : activation of the muscle between hyoid and mandible, if both are there.
+
+    Raises
+    ------
+    UnknownName : a part or muscle that is not there.
+    BadScene : a motion without a mandible.
     """
+    _check_parts(parts, motion)
     scene = report_tongue(activation, refinement)
     carried = {"mandible": "genioglossus_origin", "hyoid": "base"}
     return _in_mouth(
@@ -121,6 +127,8 @@ def published_mouth(
     folder : with ``palate.obj`` besides the files of `published_scene`.
     activation, parts, motion, geniohyoid : as in `report_mouth`.
     """
+    _check_parts(parts, motion)
+    folder = Path(folder)
     scene = published_scene(folder, activation)
     if "palate" in parts:
         body, palate = scene.body, read_surface(folder / "palate.obj", sheet=True)
@@ -134,6 +142,17 @@ def published_mouth(
     )  # fmt: skip
 
 
+def _check_parts(parts: Sequence[str], motion: dict[str, Motion] | None) -> None:
+    """Refuse unknown parts and a motion without a mandible, before meshes are made."""
+    if not isinstance(parts, tuple | list):
+        raise BadScene(f'parts must be a tuple of names, e.g. ("palate",), not {parts!r}')
+    for part in parts:
+        if part not in SURROUNDINGS:
+            raise UnknownName("part of the mouth", str(part), SURROUNDINGS)
+    if motion is not None and "mandible" not in parts:
+        raise BadScene('a motion is given, but no mandible; add "mandible" to parts')
+
+
 def _in_mouth(
     scene: Scene,
     parts: Sequence[str],
@@ -144,9 +163,6 @@ def _in_mouth(
     contact: Callable[[], Contact],
 ) -> Scene:
     """Replace supports by the bones that are wanted, and add the palate."""
-    for part in parts:
-        if part not in SURROUNDINGS:
-            raise UnknownName("part of the mouth", part, SURROUNDINGS)
     fixed = [*held, *(region for bone, region in carried.items() if bone not in parts)]
     supports: list[Support] = [Attached(*fixed)] if fixed else []
     if "mandible" in parts:

@@ -15,7 +15,7 @@ import ufl
 
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.errors import OutOfRange, is_number
 from dolfin_tongue.kinematics import Expr, Kinematics
 
 
@@ -151,5 +151,6 @@ class Held(Support):
 
 def require_vector(owner: object, name: str, value: Any) -> None:
     """Raise OutOfRange unless the value has three finite components."""
-    if np.shape(value) != (3,) or not np.isfinite(np.asarray(value, dtype=float)).all():
+    parts = value.tolist() if isinstance(value, np.ndarray) else value
+    if not (isinstance(parts, tuple | list) and len(parts) == 3 and all(map(is_number, parts))):
         raise OutOfRange(f"{type(owner).__name__}.{name}", value, "three finite numbers")

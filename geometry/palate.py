@@ -20,7 +20,14 @@ import numpy as np
 from scipy.special import ellipe
 
 from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.errors import OutOfRange, is_number, require_not_negative, require_positive
+from dolfin_tongue.body import LARGEST_SIZE
+from dolfin_tongue.errors import (
+    BadScene,
+    OutOfRange,
+    is_number,
+    require_not_negative,
+    require_positive,
+)
 from dolfin_tongue.geometry.block import gmsh_model
 from dolfin_tongue.surfaces.triangles import area_vectors
 from dolfin_tongue.surfaces.triangulated import Triangulated
@@ -43,6 +50,10 @@ TEETH_FADE = 8 * mm
 RIDGE_PLACE, RIDGE_EXTENT = 0.65, 0.35
 
 
+#: Most edges across the half width: more take minutes and gigabytes.
+FINEST = 300
+
+
 @dataclass(frozen=True)
 class Palate:
     """Measures of a palate; the defaults fit the report's tongue at rest.
@@ -61,8 +72,9 @@ class Palate:
 
     Raises
     ------
-    OutOfRange : a number that is not finite or out of its range; x not in the order front, top,
-        teeth_end, velum; a velum above the top; a ridge of more than a quarter of the height.
+    OutOfRange : a number that is not finite, out of its range or in millimetres; x not in the
+        order front, top, teeth_end, velum; a velum above the top; a ridge of more than a
+        quarter of the height.
     """
 
     front: float = 54.0 * mm
@@ -81,12 +93,17 @@ class Palate:
         require_not_negative(self, "m", ridge=self.ridge)
         for name in ("top", "velum"):
             place = getattr(self, name)
-            if np.shape(place) != (2,) or not all(is_number(float(x)) for x in place):
+            pair = isinstance(place, tuple | list) and len(place) == 2
+            if not (pair and all(map(is_number, place))):
                 raise OutOfRange(f"Palate.{name}", place, "two finite numbers, x and z")
         order = (self.front, self.top[0], self.teeth_end, self.velum[0])
-        if not (np.isfinite(order).all() and (np.diff(order) > 0).all()):
+        if not (all(map(is_number, order)) and (np.diff(order) > 0).all()):
             goal = "increasing: x of front, top, teeth_end and velum (x runs from front to back)"
             raise OutOfRange("Palate", order, goal)
+        size = max(*lengths.values(), order[-1] - order[0])
+        if size > LARGEST_SIZE:
+            goal = f"at most {LARGEST_SIZE:g} m long (multiply by 1e-3 if yours are millimetres)"
+            raise OutOfRange("Palate: largest measure", size, goal, "m")
         if self.velum[1] > self.top[1]:
             raise OutOfRange("Palate.velum", self.velum, "not above the top (x and z)")
         if self.ridge > self.height / 4:
@@ -163,7 +180,7 @@ class Palate:
 
         Parameters
         ----------
-        mesh_size : length of the edges, m, > 0 and at most a quarter of the half width.
+        mesh_size : length of the edges, m, between a 300th and a quarter of the half width.
 
         Returns
         -------
@@ -174,9 +191,10 @@ class Palate:
         ------
         OutOfRange : a mesh size out of its range.
         """
-        largest = self.half_width / 4
-        if not (is_number(mesh_size) and 0 < mesh_size <= largest):
-            raise OutOfRange("mesh_size", mesh_size, f"> 0 and at most {largest:.3g}", "m")
+        least, largest = self.half_width / FINEST, self.half_width / 4
+        if not (is_number(mesh_size) and least <= mesh_size <= largest):
+            goal = f"> 0, at least {least:.3g} and at most {largest:.3g}"
+            raise OutOfRange("mesh_size", mesh_size, goal, "m")
         front, side = (arc + self.teeth for arc in self._arcs)
         wide = 1 + self.edge / side
         back = float(np.hypot(self.velum[0] - self.top[0], self.top[1] - self.velum[1]))
@@ -205,6 +223,8 @@ def report_palate(
     ------
     OutOfRange : a mesh size out of its range.
     """
+    if palate is not None and not isinstance(palate, Palate):
+        raise BadScene(f"report_palate takes measures, e.g. Palate(height=0.012), not {palate!r}")
     points, triangles = (palate or Palate()).triangles(mesh_size)
     return Triangulated(points, triangles, sheet=True, **options)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
 from dolfin_tongue.body import Body
-from dolfin_tongue.control.motion import Motion
-from dolfin_tongue.errors import BadScene, OutOfRange, require_positive
+from dolfin_tongue.control.motion import Motion, check_motion
+from dolfin_tongue.errors import BadScene, OutOfRange, is_number, listing, require_positive
 from dolfin_tongue.faces import BOUNDARY
 from dolfin_tongue.kinematics import Expr, Kinematics
 from dolfin_tongue.surfaces.base import Gap, Surface
@@ -66,7 +66,7 @@ class Barrier(ContactLaw):
     def __post_init__(self) -> None:
         require_positive(self, "m", range=self.range)
         require_positive(self, "Pa", pressure=self.pressure)
-        if not self.steep > 2:
+        if not (is_number(self.steep) and self.steep > 2):
             raise OutOfRange("Barrier.steep", self.steep, "> 2")
 
     def traction(
@@ -113,8 +113,9 @@ class ReportContact(ContactLaw):
         require_positive(self, "", a1=self.a1)
         require_positive(self, "m", range=self.range)
         for name in ("a2", "a3"):
-            if not getattr(self, name) >= 1:
-                raise OutOfRange(f"ReportContact.{name}", getattr(self, name), ">= 1")
+            value = getattr(self, name)
+            if not (is_number(value) and value >= 1):
+                raise OutOfRange(f"ReportContact.{name}", value, ">= 1")
 
     def traction(
         self, gap: FloatArray, rate: FloatArray | None
@@ -159,7 +160,8 @@ class Contact(Term):
     Raises
     ------
     UnknownName : a surface that the body does not have.
-    BadScene : surface points behind the obstacle at rest.
+    BadScene : no obstacle, law or motion; surface points behind the obstacle at rest, or where it
+        has no distance.
     """
 
     obstacle: Surface
@@ -170,6 +172,8 @@ class Contact(Term):
     def __post_init__(self) -> None:
         if not isinstance(self.obstacle, Surface):
             raise BadScene(f"Contact takes a surface first, e.g. Plane(), not {self.obstacle!r}")
+        if not isinstance(self.surface, str):
+            raise BadScene(f"Contact.surface must be the name of one, not {self.surface!r}")
         if not isinstance(self.law, ContactLaw):
             raise BadScene(f"Contact.law must be a law such as Barrier(), not {self.law!r}")
         if self.motion is not None and not (
@@ -181,17 +185,25 @@ class Contact(Term):
                 "Contact.motion must be three motions for x, y, z, e.g. "
                 "(Still(), Still(), SmoothMove(-0.005))"
             )
+        for axis, part in zip("xyz", self.motion or (), strict=False):
+            check_motion(f"Contact.motion along {axis}", part)
 
     def check(self, body: Body) -> None:
         """Refuse an unknown surface, and nodes of it that start behind the obstacle."""
         nodes = np.unique(body.surface(self.surface))
         distance = self.obstacle.gap(body.points[nodes] - self.shift(0.0)[0]).distance
+        nowhere = nodes[np.isnan(distance)]
+        if nowhere.size:
+            raise BadScene(
+                f"the obstacle, {type(self.obstacle).__name__}, has no distance (NaN) at node(s) "
+                f"{listing(nowhere)} of the surface {self.surface!r}; it must be defined there"
+            )
         behind = np.flatnonzero(~(distance > 0))
         if behind.size:
             raise BadScene(
                 f"{behind.size} of {len(nodes)} node(s) of the surface {self.surface!r} start "
-                f"behind the obstacle, the deepest by {-distance.min():.3g} m. Move one of them, "
-                "or turn the obstacle round if its free side is the other one"
+                f"on or behind the obstacle, the deepest by {abs(distance.min()):.3g} m. Move "
+                "body or obstacle, or turn the obstacle round if its free side is the other one"
             )
 
     def shift(self, time: float) -> tuple[FloatArray, FloatArray]:

@@ -70,7 +70,8 @@ class Sliding(Support):
 
 def off_surface(surface: Surface, points: FloatArray) -> FloatArray:
     """Distance of points from a surface to first order, g / |dg/dy|, shape (k,), m."""
-    return surface.value(points) / np.linalg.norm(surface.gradient(points), axis=1)
+    with np.errstate(all="ignore"):  # no gradient on an axis or at a centre
+        return surface.value(points) / np.linalg.norm(surface.gradient(points), axis=1)
 
 
 def moved_onto(body: Body, surface: Surface, *regions: str) -> Body:
@@ -79,8 +80,16 @@ def moved_onto(body: Body, surface: Surface, *regions: str) -> Body:
     Raises
     ------
     BadMesh : the projection inverts a cell.
+    BadScene : nodes that have no place on the surface.
     """
     nodes = Sliding(surface, *regions).nodes(body)
     points = body.points.copy()
-    points[nodes] = surface.project(points[nodes])
+    with np.errstate(all="ignore"):  # those without a place are named below
+        points[nodes] = surface.project(points[nodes])
+    lost = nodes[~np.isfinite(points[nodes]).all(axis=1)]
+    if lost.size:
+        raise BadScene(
+            f"no place on the surface is found for node(s) {listing(lost)}: it has none, or they "
+            "lie on its axis or centre"
+        )
     return replace(body, points=points)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, pi, sin
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -23,6 +23,24 @@ class Motion(Protocol):
     @property
     def breakpoints(self) -> tuple[float, ...]:
         """Times (s) at which the acceleration is not smooth."""
+
+
+def check_motion(what: str, motion: Any) -> None:
+    """Raise BadScene unless something that looks like a motion gives finite numbers at t = 0."""
+    if isinstance(motion, type):
+        raise BadScene(f"{what} is the class {motion.__name__}; make one, e.g. SmoothMove(0.01)")
+    try:
+        found = np.asarray(motion.at(0.0), dtype=float)
+        times = np.asarray(motion.breakpoints, dtype=float)
+    except Exception as error:  # whatever a user's own motion does
+        raise BadScene(f"{what}, {motion!r}, raises {error!r} at t = 0") from error
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise BadScene(
+            f"{what}: at(0.0) must give three finite numbers, value, rate and acceleration, not "
+            f"{found}"
+        )
+    if times.ndim != 1 or not np.isfinite(times).all():
+        raise BadScene(f"{what}: breakpoints must be a tuple of times, s, not {times}")
 
 
 @dataclass(frozen=True)
@@ -117,7 +135,8 @@ class Recorded:
 
     Raises
     ------
-    BadScene : different lengths, fewer than two, not finite, or times that do not increase.
+    BadScene : no numbers, different lengths, fewer than two, not finite, or times that do not
+        increase.
     """
 
     times: tuple[float, ...]
@@ -125,7 +144,11 @@ class Recorded:
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):
-            object.__setattr__(self, name, tuple(float(x) for x in getattr(self, name)))
+            try:
+                numbers = tuple(float(x) for x in getattr(self, name))
+            except (TypeError, ValueError) as error:
+                raise BadScene(f"{name} of a recorded motion must be numbers: {error}") from error
+            object.__setattr__(self, name, numbers)
         if len(self.times) != len(self.values) or len(self.times) < 2:
             raise BadScene(
                 f"a recorded motion needs as many times as values and at least two, not "

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import Body
-from dolfin_tongue.control.motion import Motion
+from dolfin_tongue.body import LARGEST_SIZE, Body
+from dolfin_tongue.control.motion import Motion, check_motion
 from dolfin_tongue.errors import BadScene, require_positive
-from dolfin_tongue.rigid.forces import SKULL, RigidForce
+from dolfin_tongue.rigid.forces import SKULL, Line, PointForce, RigidForce, Turning
 from dolfin_tongue.term import Support, require_vector
 
 Vector = tuple[float, float, float]
@@ -42,7 +42,8 @@ class RigidBody(Support):
     Raises
     ------
     OutOfRange : mass or inertia not > 0.
-    BadScene : unknown coordinates, or something that is no force or motion.
+    BadScene : unknown coordinates, something that is no force or motion, a motion that does not
+        start at zero, places in millimetres.
     UnknownName : a region that the body does not have.
     """
 
@@ -58,7 +59,9 @@ class RigidBody(Support):
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name or self.name == SKULL:
             raise BadScene(f"a rigid body needs a name of its own, not {self.name!r}")
-        if isinstance(self.regions, str) or not all(isinstance(r, str) for r in self.regions):
+        if not (
+            isinstance(self.regions, tuple | list) and all(isinstance(r, str) for r in self.regions)
+        ):
             raise BadScene(
                 f'{self.name}: regions must be a tuple of names, e.g. ("jaw",), not '
                 f"{self.regions!r}"
@@ -68,10 +71,19 @@ class RigidBody(Support):
         require_vector(self, "centre", self.centre)
         if self.pivot is not None:
             require_vector(self, "pivot", self.pivot)
-        if isinstance(self.forces, RigidForce) or not all(
-            isinstance(force, RigidForce) for force in self.forces
+        if not (
+            isinstance(self.forces, tuple | list)
+            and all(isinstance(force, (PointForce, Turning, Line)) for force in self.forces)
         ):
-            raise BadScene(f"{self.name}: forces must be a tuple of them, e.g. (Moment(0.1),)")
+            raise BadScene(
+                f"{self.name}: forces must be a tuple of them, e.g. (Moment(0.1),); for a law of "
+                f"your own take StateForce. Not {self.forces!r}"
+            )
+        if not isinstance(self.motion, Mapping):
+            raise BadScene(
+                f'{self.name}: motion must map coordinates to motions, e.g. {{"x": Still()}}, not '
+                f"{self.motion!r}"
+            )
         for coordinate, motion in self.motion.items():
             if coordinate not in COORDINATES:
                 raise BadScene(
@@ -82,6 +94,7 @@ class RigidBody(Support):
                     f"{self.name}: the motion of {coordinate!r} must be one, e.g. Still() or "
                     f"SmoothMove(0.01), not {motion!r}"
                 )
+            check_motion(f"{self.name}: the motion of {coordinate!r}", motion)
 
     @property
     def label(self) -> str:
@@ -89,12 +102,25 @@ class RigidBody(Support):
         return self.name
 
     def check(self, body: Body) -> None:
-        """Refuse a motion that does not start at zero: the tissue would be torn."""
+        """Refuse a motion that does not start at zero (tissue would be torn), and millimetres."""
         for coordinate, motion in self.motion.items():
             if abs(motion.at(0.0)[0]) > 1e-12:
                 raise BadScene(
                     f"{self.name}: the motion of {coordinate!r} must be 0 at t = 0, where the "
                     f"tissue is undeformed, not {motion.at(0.0)[0]:g}"
+                )
+        places = {"centre": self.centre, "pivot": self.reference}
+        for force in self.forces:
+            for name in ("point", "anchor"):
+                if hasattr(force, name):
+                    places[f"{name} of a {type(force).__name__}"] = getattr(force, name)
+        middle = body.points.mean(axis=0)
+        for name, place in places.items():
+            away = float(np.linalg.norm(place - middle))
+            if away > LARGEST_SIZE:
+                raise BadScene(
+                    f"{self.name}: the {name} {place} is {away:.3g} m from the tissue; coordinates "
+                    "are metres: multiply by 1e-3 if yours are millimetres"
                 )
 
     def nodes(self, body: Body) -> IntArray:

@@ -6,7 +6,7 @@ velocities; `loads.Loads` turns them into forces and moments on the coordinates.
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -98,7 +98,7 @@ class PointForce(_Controlled):
         return self._level(time) * np.asarray(self.force, dtype=float)
 
 
-class Turning(RigidForce):
+class Turning(RigidForce, ABC):
     """A moment that depends on the coordinates of its body alone."""
 
     @abstractmethod
@@ -177,7 +177,13 @@ class StateForce(Turning):
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise BadScene(f"StateForce takes a function of (t, q, v), not {self.function!r}")
-        value = np.asarray(self.function(0.0, np.zeros(3), np.zeros(3)), dtype=float)
+        try:
+            value = np.asarray(self.function(0.0, np.zeros(3), np.zeros(3)), dtype=float)
+        except Exception as error:  # whatever a user's function does
+            raise BadScene(
+                "StateForce.function must give three finite numbers (N, N, N m); at rest it raises "
+                f"{error!r}"
+            ) from error
         if value.shape != (3,) or not np.isfinite(value).all():
             raise BadScene("StateForce.function must give three finite numbers (N, N, N m)")
 
@@ -196,7 +202,7 @@ class StateForce(Turning):
 
 
 @dataclass(frozen=True)
-class Line(RigidForce):
+class Line(RigidForce, ABC):
     """Base of what pulls along the straight line between two points.
 
     Parameters
@@ -215,6 +221,11 @@ class Line(RigidForce):
         require_vector(self, "anchor", self.anchor)
         if self.length == 0:
             raise OutOfRange(f"{type(self).__name__}.anchor", self.anchor, "apart from the point")
+        if not isinstance(self.to, str):
+            raise BadScene(
+                f"{type(self).__name__}.to must be the name of a rigid body or {SKULL!r}, not "
+                f"{self.to!r}"
+            )
 
     @property
     def length(self) -> float:
@@ -279,6 +290,10 @@ class LineMuscle(Line):
             raise BadScene(
                 f"LineMuscle.activation must be a control, e.g. Ramp(0.5), not {self.activation!r}"
             )
+        for time in (0.0, *self.activation.breakpoints):
+            require_activation(self.activation(time), f"activation at t = {time:g} s")
+        if not isinstance(self.law, StressMobilisation):
+            raise BadScene(f"LineMuscle.law must be StressMobilisation(...), not {self.law!r}")
 
     def tension(self, time: float, length: float, rate: float) -> tuple[float, float, float]:
         """Tension and its derivatives, by central differences of the two factors."""

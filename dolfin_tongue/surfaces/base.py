@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.arrays import FloatArray, real_numbers
+from dolfin_tongue.errors import BadMesh, BadScene
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +27,20 @@ class Gap:
     distance: FloatArray
     normal: FloatArray
     curvature: FloatArray
+
+
+def require_surface(what: str, value: Any) -> None:
+    """Raise BadScene unless the value is a surface (and not its class)."""
+    if not isinstance(value, Surface):
+        raise BadScene(f"{what} must be a surface, e.g. Plane(), not {value!r}")
+
+
+def require_places(what: str, value: Any) -> FloatArray:
+    """Array of places, shape (k, 3), m; BadMesh for other shapes and what is not finite."""
+    places = real_numbers(what, value)
+    if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
+        raise BadMesh(f"{what} must be finite and of shape (k, 3), not {places.shape}")
+    return places
 
 
 class Surface(ABC):

@@ -7,7 +7,7 @@ import numpy as np
 from dolfin_tongue.arrays import IntArray
 from dolfin_tongue.body import Body
 from dolfin_tongue.errors import BadScene, require_not_negative, require_positive
-from dolfin_tongue.surfaces.base import Surface
+from dolfin_tongue.surfaces.base import Surface, require_surface
 
 
 def facing(body: Body, obstacle: Surface, reach: float, overlap: float = 0.0) -> IntArray:
@@ -30,8 +30,12 @@ def facing(body: Body, obstacle: Surface, reach: float, overlap: float = 0.0) ->
 
     Raises
     ------
-    BadScene : no face faces the obstacle.
+    BadScene : no body, no surface, or no face that faces the obstacle.
+    OutOfRange : a reach or overlap out of its range.
     """
+    if not isinstance(body, Body):
+        raise BadScene(f"facing takes a body first, not {body!r}")
+    require_surface("facing: the obstacle", obstacle)
     require_positive(body, "m", reach=reach)
     require_not_negative(body, "m", overlap=overlap)
     faces = body.boundary

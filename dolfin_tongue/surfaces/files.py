@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.errors import BadMesh, OutOfRange, is_number
+from dolfin_tongue.errors import BadMesh, OutOfRange, is_number, listing
 from dolfin_tongue.surfaces.triangulated import Triangulated
 
 #: What VTK reads better than meshio: OBJ files with normals and texture, and VTK's own surfaces.
@@ -46,6 +46,12 @@ def read_surface(path: Path | str, scale: float = 1.0, **options: Any) -> Triang
     points, triangles = _by_vtk(path) if path.suffix.lower() in BY_VTK else _by_meshio(path)
     if not len(triangles):
         raise BadMesh(f"{path} holds no triangles or quadrilaterals")
+    wrong = np.flatnonzero(((triangles < 0) | (triangles >= len(points))).any(axis=1))
+    if wrong.size:
+        raise BadMesh(
+            f"{path}: triangle(s) {listing(wrong)} name points that the file does not have; it has "
+            f"{len(points)}"
+        )
     return Triangulated(*merge_points(points * scale, triangles), **options)
 
 

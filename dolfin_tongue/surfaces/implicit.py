@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.errors import OutOfRange, TongueError, require_positive
+from dolfin_tongue.errors import OutOfRange, TongueError, require_flags, require_positive
 from dolfin_tongue.surfaces.base import Gap, Surface
 from dolfin_tongue.surfaces.differences import Function, first_derivatives, second_derivatives
 from dolfin_tongue.surfaces.simple import Vector
@@ -84,6 +84,7 @@ class Ellipsoid(Surface):
     def __post_init__(self) -> None:
         require_vector(self, "centre", self.centre)
         require_vector(self, "semi_axes", self.semi_axes)
+        require_flags(self, inside=self.inside)
         for axis, length in zip("xyz", self.semi_axes, strict=True):
             require_positive(self, "m", **{f"semi_axes_{axis}": length})
 
@@ -156,8 +157,8 @@ class Implicit(Surface):
 
     Raises
     ------
-    OutOfRange : values of a wrong shape or nowhere finite at a few places within 1.6 m of the
-        origin, gradient zero at all of them, step <= 0.
+    OutOfRange : functions that raise, values of a wrong shape or nowhere finite at a few places
+        within 1.6 m of the origin, gradient zero at all of them, step <= 0.
     BadScene : a UFL expression that has no value at a point alone (coefficients, integrals).
     """
 
@@ -178,23 +179,26 @@ class Implicit(Surface):
         for name, value in {**fields, "step": step}.items():
             object.__setattr__(self, name, value)
         require_positive(self, "m", step=step)
+        for name, value in (("gradient", gradient), ("hessian", hessian)):
+            if value is not None and not callable(value):
+                raise OutOfRange(f"Implicit.{name}", value, "a function of points (k, 3)")
         count = len(PROBES)
         with np.errstate(all="ignore"):  # not every place need be one where g is defined
-            _require_shape("function", self._tried(), (count,))
-            slope = _require_shape("gradient", self.gradient(PROBES), (count, 3))
-            _require_shape("hessian", self.hessian(PROBES), (count, 3, 3))
+            _require_shape("function", self._tried("function", self.value), (count,))
+            slope = _require_shape("gradient", self._tried("gradient", self.gradient), (count, 3))
+            _require_shape("hessian", self._tried("hessian", self.hessian), (count, 3, 3))
         if not slope[np.isfinite(slope)].any():
             raise OutOfRange("Implicit.function", "constant", "a function that varies")
 
-    def _tried(self) -> FloatArray:
+    def _tried(self, name: str, function: Function) -> FloatArray:
         """Values at a few places."""
         try:
-            return self.value(PROBES)
+            return function(PROBES)
         except TongueError:
             raise
         except Exception as error:
             raise OutOfRange(
-                "Implicit.function", self.function, f"{KINDS}; it raises {error!r}"
+                f"Implicit.{name}", self.function, f"{KINDS}; it raises {error!r}"
             ) from error
 
     @cached_property

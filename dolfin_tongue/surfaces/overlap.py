@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.surfaces.base import Surface
+from dolfin_tongue.surfaces.base import Surface, require_places, require_surface
 
 
 def overlap(surface: Surface, points: FloatArray) -> FloatArray:
@@ -19,5 +19,12 @@ def overlap(surface: Surface, points: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (k,), m -- 0 on the free side and where the surface does not reach.
+
+    Raises
+    ------
+    BadScene : no surface.
+    BadMesh : points of another shape, or not finite.
     """
-    return np.maximum(-surface.gap(np.asarray(points, dtype=float)).distance, 0.0)
+    require_surface("overlap: the surface", surface)
+    places = require_places("overlap: points", points)
+    return np.maximum(-surface.gap(places).distance, 0.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.errors import OutOfRange, require_positive
+from dolfin_tongue.errors import OutOfRange, require_flags, require_positive
 from dolfin_tongue.surfaces.base import Surface
 from dolfin_tongue.term import require_vector
 
@@ -113,6 +113,7 @@ class Cylinder(Round):
         require_vector(self, "point", self.point)
         unit(self, "axis", self.axis)
         require_positive(self, "m", radius=self.radius)
+        require_flags(self, inside=self.inside)
 
     @property
     def _middle(self) -> tuple[FloatArray, FloatArray]:
@@ -138,6 +139,7 @@ class Sphere(Round):
     def __post_init__(self) -> None:
         require_vector(self, "centre", self.centre)
         require_positive(self, "m", radius=self.radius)
+        require_flags(self, inside=self.inside)
 
     @property
     def _middle(self) -> tuple[FloatArray, FloatArray]:

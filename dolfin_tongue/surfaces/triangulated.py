@@ -24,8 +24,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from dolfin_tongue.arrays import FloatArray, IntArray, real_numbers, whole_numbers
-from dolfin_tongue.errors import OutOfRange, is_number, require_not_negative, require_positive
-from dolfin_tongue.surfaces.base import Gap, Surface
+from dolfin_tongue.errors import (
+    OutOfRange,
+    is_number,
+    require_flags,
+    require_not_negative,
+    require_positive,
+)
+from dolfin_tongue.surfaces.base import Gap, Surface, require_places
 from dolfin_tongue.surfaces.retraction import Retraction, retraction_for
 from dolfin_tongue.surfaces.triangles import check_triangles, typical_edge
 
@@ -109,6 +115,9 @@ class Triangulated(Surface):
 
     def __post_init__(self) -> None:
         name = type(self).__name__
+        require_flags(self, sheet=self.sheet, inside=self.inside)
+        if not (self.retraction is None or isinstance(self.retraction, Retraction)):
+            raise OutOfRange(f"{name}.retraction", self.retraction, "None, or made by yielding()")
         object.__setattr__(self, "points", real_numbers(f"{name}: points", self.points))
         triangles = whole_numbers(f"{name}: triangles", self.triangles)
         object.__setattr__(self, "triangles", triangles)
@@ -249,7 +258,9 @@ class Triangulated(Surface):
         Raises
         ------
         OutOfRange : clearance not a number within the band, radius <= 0.
+        BadMesh : points of another shape, or not finite.
         """
+        points = require_places("points", points)
         if not (is_number(clearance) and abs(clearance) < cast(float, self.band)):
             allowed = f"a number smaller than the band, {self.band:.3g}"
             raise OutOfRange("clearance", clearance, allowed, "m")
