@@ -88,8 +88,9 @@ class Palate:
     velum: tuple[float, float] = (133.0 * mm, 99.0 * mm)
 
     def __post_init__(self) -> None:
-        lengths = ("height", "half_width", "teeth", "edge")
-        require_positive(self, "m", **{name: getattr(self, name) for name in lengths})
+        names = ("height", "half_width", "teeth", "edge")
+        lengths = {name: getattr(self, name) for name in names}
+        require_positive(self, "m", **lengths)
         require_not_negative(self, "m", ridge=self.ridge)
         for name in ("top", "velum"):
             place = getattr(self, name)
