@@ -19,7 +19,8 @@ from dolfin_tongue.compile import compile_form
 from dolfin_tongue.coupling import Arguments, ContactSurface
 from dolfin_tongue.shape import gauss_jacobians
 from dolfin_tongue.state import State
-from dolfin_tongue.system import System, labels_of
+from dolfin_tongue.system import System
+from dolfin_tongue.term import labels_of
 
 
 def volume_changes(body: Body, displacement: FloatArray) -> FloatArray:

@@ -10,7 +10,6 @@ accepted state keeps its volumes, while the rows of momentum are stated at the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from petsc4py import PETSc
 
 from dolfin_tongue.arrays import FloatArray, IntArray
 from dolfin_tongue.boundary.contact import Contact
+from dolfin_tongue.cell_fields import CellFields
 from dolfin_tongue.compile import compile_form
 from dolfin_tongue.constitutive.incompressible import pressure_power, volume_condition
 from dolfin_tongue.coupling import (
@@ -34,59 +34,10 @@ from dolfin_tongue.coupling import (
 )
 from dolfin_tongue.errors import BadScene, listing
 from dolfin_tongue.kinematics import Kinematics
-from dolfin_tongue.mesh import cell_function, mixed_space, set_cell_values
+from dolfin_tongue.mesh import mixed_space
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.state import State
-from dolfin_tongue.term import Term
-
-
-class CellFields:
-    """What terms borrow (see `term.Fields`): cell-wise coefficients, and measures of surfaces.
-
-    Coefficients that vary follow the time.
-    """
-
-    def __init__(self, space):
-        self.body = space.body
-        self._space = space
-        # One list for all measures: a form takes its facets from a single place.
-        self._facets: list[tuple[int, IntArray]] = []
-        self._surfaces: dict[str, ufl.Measure] = {}
-        self._varying: list[tuple[fem.Function, Callable[[float], FloatArray]]] = []
-        self._time = np.nan
-
-    def on_cells(self, values: FloatArray) -> fem.Function:
-        """Coefficient with constant values of shape (m,) or (m, k), in the body's order."""
-        components = values.shape[1] if values.ndim > 1 else 1
-        function = cell_function(self._space.mesh, components)
-        set_cell_values(function, values, self._space.parents)
-        return function
-
-    def varying_on_cells(self, values: Callable[[float], FloatArray]) -> fem.Function:
-        """Coefficient whose values are evaluated at each new time."""
-        function = self.on_cells(values(0.0))
-        self._varying.append((function, values))
-        self._time = np.nan
-        return function
-
-    def surface(self, name: str) -> ufl.Measure:
-        """Measure of a named surface; its facets are looked for when it is first asked for."""
-        if name not in self._surfaces:
-            number = len(self._facets) + 1
-            facets = self._space.facets(self.body.surface(name))
-            self._facets.append((number, facets.astype(np.int32).ravel()))
-            self._surfaces[name] = ufl.Measure(
-                "ds", self._space.mesh, subdomain_id=number, subdomain_data=self._facets,
-                metadata={"quadrature_degree": self._space.pair.quadrature_degree},
-            )  # fmt: skip
-        return self._surfaces[name]
-
-    def set_time(self, time: float) -> None:
-        """Evaluate the varying coefficients at a time, s."""
-        if time != self._time:
-            for function, values in self._varying:
-                set_cell_values(function, values(time), self._space.parents)
-            self._time = time
+from dolfin_tongue.term import labels_of
 
 
 class System:
@@ -396,14 +347,3 @@ class System:
 def _places(matrix: sp.csr_array) -> tuple[IntArray, IntArray]:
     """Row starts and columns in the integers of PETSc."""
     return matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType)
-
-
-def labels_of(terms: Sequence[Term]) -> list[str]:
-    """Class names of the terms in small letters, numbered where one occurs twice."""
-    names = [type(term).__name__ for term in terms]
-    labels = []
-    for i, name in enumerate(names):
-        suffix = f"_{names[: i + 1].count(name)}" if names.count(name) > 1 else ""
-        words = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
-        labels.append(words + suffix)
-    return labels

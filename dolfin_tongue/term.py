@@ -7,7 +7,7 @@ nodal force for the same class. What a scene does not list is not compiled, stor
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -154,3 +154,14 @@ def require_vector(owner: object, name: str, value: Any) -> None:
     parts = value.tolist() if isinstance(value, np.ndarray) else value
     if not (isinstance(parts, tuple | list) and len(parts) == 3 and all(map(is_number, parts))):
         raise OutOfRange(f"{type(owner).__name__}.{name}", value, "three finite numbers")
+
+
+def labels_of(terms: Sequence[Term]) -> list[str]:
+    """Class names of the terms in small letters, numbered where one occurs twice."""
+    names = [type(term).__name__ for term in terms]
+    labels = []
+    for i, name in enumerate(names):
+        suffix = f"_{names[: i + 1].count(name)}" if names.count(name) > 1 else ""
+        words = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
+        labels.append(words + suffix)
+    return labels

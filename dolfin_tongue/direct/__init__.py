@@ -7,10 +7,10 @@ share the dataclasses of the terms, of which only numbers are read here.
 
 Reading order: `elements` (shape functions, kappa) - `mesh` - `volume` (96), (101) - `tensors`,
 `isochoric`, `passive`, `rates` (stress and moduli at points) - `points` (element loops) - `faces`,
-`membranes` (47), `contacts` (58) - `forces` (which term has which law) - `model` (the semi-discrete
-equations, no dt), with `slides` (49)-(52) and `bodies` (61), (62) - `multipliers` (53)-(57) -
-`limits`, `impacts` (what contact may do in a step), `integrate` (explicit methods) - `saddle`,
-`border`, `implicit` - `balance`, `trouble`.
+`membranes` (47), `contacts` (58) - `forces` (which term has which law) - `problem`, `model` (the
+semi-discrete equations, no dt), with `slides` (49)-(52) and `bodies` (61), (62) - `multipliers`
+(53)-(57) - `limits`, `impacts` (what contact may do in a step), `integrate` (explicit methods) -
+`saddle`, `border`, `implicit` - `balance`, `trouble`.
 
 Conventions
 -----------
@@ -40,7 +40,8 @@ from dolfin_tongue.direct.elements import KINDS
 from dolfin_tongue.direct.implicit import Implicit
 from dolfin_tongue.direct.integrate import Adaptive, Direct, RungeKutta4
 from dolfin_tongue.direct.mesh import Mesh
-from dolfin_tongue.direct.model import Model, Problem, problem_of
+from dolfin_tongue.direct.model import Model
+from dolfin_tongue.direct.problem import Problem, problem_of
 
 __all__ = [
     "KINDS",
