@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from dolfin_tongue.boundary import Attached, Barrier, Contact, Gravity, ReportContact
 from dolfin_tongue.constitutive import MooneyRivlin, ReportTissue, Viscosity
 from dolfin_tongue.control import SmoothMove, Still
+from dolfin_tongue.direct import Model, problem_of
 from dolfin_tongue.errors import BadScene, OutOfRange, UnknownName
 from dolfin_tongue.geometry.simple import ball_body, block_body, distort
 from dolfin_tongue.mesh import PAIRS
@@ -290,10 +291,8 @@ def observed(solver, state):
 @pytest.mark.parametrize("pair", PAIRS)
 def test_block_pressed_by_a_rising_plane(pair):
     """Held at its top, pressed from below: contact, supports and weight are in balance."""
-    body = block_body((0.02, 0.02, 0.01), (4, 4, 2))
-    rising = (Still(), Still(), SmoothMove(1.2e-3))
-    contact = Contact(Plane((0, 0, -5e-4)), "z0", motion=rising)
-    scene = Scene(body, (ReportTissue(), Gravity(), contact), (Attached("z1"),))
+    scene = pressed_block()
+    body = scene.body
     solver = Statics(scene, Tolerances(1e-11, iterations=25, renew_above=0.0), pair=pair)
     state = solver.solve()
     shown, held = observed(solver, state)
@@ -525,14 +524,8 @@ def graded_ball(cells):
     return replace(body, points=points, node_sets={"core": core})
 
 
-def squeezed(cells, share):
-    """Force and radius of contact of a ball between two planes, over Hertz and over Tatara.
-
-    nu = 1/2: E = 3 mu, E* = E/(1 - nu^2) = 4 mu; Hertz: a^2 = R d, F = 16/3 mu a^3 / R for the
-    approach d per plane. Of a whole ball between two planes the far side gives way the less
-    (Tatara 1991): d = a^2/R - F/(pi E) (3 R^2 (a^2 + 4 R^2)^-1.5 + 0.75 (a^2 + 4 R^2)^-0.5).
-    The approach is that of the planes less the mean gap, weighted with the force; range d/50.
-    """
+def pressed_ball(cells, share):
+    """A ball between two planes, with an approach of that share of its radius per plane."""
     d = share * BALL
     reach = d / 50
     law = Barrier(reach, 2 / np.pi * 4 * MU * np.sqrt(share), 10.0)
@@ -545,7 +538,20 @@ def squeezed(cells, share):
         for s in (1.0, -1.0)
     ]  # fmt: skip
     terms = (MooneyRivlin(MU / 2, 0.0, 0.0), *planes)
-    solver = Statics(Scene(graded_ball(cells), terms, (Attached("core"),)))
+    return Scene(graded_ball(cells), terms, (Attached("core"),))
+
+
+def squeezed(cells, share):
+    """Force and radius of contact of a ball between two planes, over Hertz and over Tatara.
+
+    nu = 1/2: E = 3 mu, E* = E/(1 - nu^2) = 4 mu; Hertz: a^2 = R d, F = 16/3 mu a^3 / R for the
+    approach d per plane. Of a whole ball between two planes the far side gives way the less
+    (Tatara 1991): d = a^2/R - F/(pi E) (3 R^2 (a^2 + 4 R^2)^-1.5 + 0.75 (a^2 + 4 R^2)^-0.5).
+    The approach is that of the planes less the mean gap, weighted with the force; range d/50.
+    """
+    d = share * BALL
+    reach = d / 50
+    solver = Statics(pressed_ball(cells, share))
     state = solver.solve()
     system = solver.system
     system.set_state(solver.time, system.vectors(state)[0])
@@ -573,6 +579,35 @@ def test_hertz():
     assert 1.05 < hertz < 1.2  # a/R = 0.14: a whole ball is stiffer than a half space by 10 %
     assert tatara == pytest.approx(1.0, abs=0.1)
     assert radius == pytest.approx(1.0, abs=0.15)
+
+
+def pressed_block():
+    """A block that is held at its top and pressed from below by a plane."""
+    body = block_body((0.02, 0.02, 0.01), (4, 4, 2))
+    rising = (Still(), Still(), SmoothMove(1.2e-3))
+    contact = Contact(Plane((0, 0, -5e-4)), "z0", motion=rising)
+    return Scene(body, (ReportTissue(), Gravity(), contact), (Attached("z1"),))
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: pressed_ball(4, 0.02), pressed_block], ids=["ball", "block"]
+)
+def test_what_rests_in_contact_rests_in_the_direct_solver_too(make):
+    """All nodal forces there, pressures included, vanish where no support holds."""
+    scene = make()
+    solver = Statics(scene, Tolerances(1e-11, iterations=25, renew_above=0.0))
+    state = replace(solver.solve(), time=solver.time)
+    model = Model(problem_of(scene))
+    u, v = model.rows(state)
+    force = model.force(solver.time, u, v)
+    largest = np.abs(force).max()
+    model.add_constraint_force(model.constraint_gradients(u), model.multipliers(state), force)
+    assert np.abs(force[model.free]).max() <= 1e-6 * largest
+    shown, _ = observed(solver, state)
+    name = "contact_1" if len(model.obstacles) > 1 else "contact"
+    touch = model.obstacles[0][1].touch(solver.time, u, v)
+    assert touch.resultant[2] == pytest.approx(shown[f"{name}_force_z_N"], rel=1e-9)
+    assert touch.area == pytest.approx(shown[f"{name}_area_m2"], rel=1e-9)
 
 
 @pytest.mark.slow
