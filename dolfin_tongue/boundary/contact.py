@@ -189,21 +189,25 @@ class Contact(Term):
             check_motion(f"Contact.motion along {axis}", part)
 
     def check(self, body: Body) -> None:
-        """Refuse an unknown surface, and nodes of it that start behind the obstacle."""
-        nodes = np.unique(body.surface(self.surface))
-        distance = self.obstacle.gap(body.points[nodes] - self.shift(0.0)[0]).distance
-        nowhere = nodes[np.isnan(distance)]
-        if nowhere.size:
+        """Refuse an unknown surface, and points of it that start behind the obstacle."""
+        corners = body.points[body.surface(self.surface)]
+        edges = (corners + np.roll(corners, 1, axis=1)) / 2
+        points = np.concatenate([*corners, *edges, corners.mean(axis=1)])
+        points = np.unique(points, axis=0)
+        distance = self.obstacle.gap(points - self.shift(0.0)[0]).distance
+        if np.isnan(distance).any():
             raise BadScene(
-                f"the obstacle, {type(self.obstacle).__name__}, has no distance (NaN) at node(s) "
-                f"{listing(nowhere)} of the surface {self.surface!r}; it must be defined there"
+                f"the obstacle, {type(self.obstacle).__name__}, has no distance (NaN) at points of "
+                f"the surface {self.surface!r}: {listing(points[np.isnan(distance)], 3)}; it must "
+                "be defined there"
             )
-        behind = np.flatnonzero(~(distance > 0))
-        if behind.size:
+        behind = np.count_nonzero(~(distance > 0))
+        if behind:
             raise BadScene(
-                f"{behind.size} of {len(nodes)} node(s) of the surface {self.surface!r} start "
-                f"on or behind the obstacle, the deepest by {abs(distance.min()):.3g} m. Move "
-                "body or obstacle, or turn the obstacle round if its free side is the other one"
+                f"{behind} of {len(points)} points (nodes, middles of edges and faces) of the "
+                f"surface {self.surface!r} start on or behind the obstacle, the deepest by "
+                f"{abs(distance.min()):.3g} m. Move body or obstacle, or turn the obstacle round "
+                "if its free side is the other one"
             )
 
     def shift(self, time: float) -> tuple[FloatArray, FloatArray]:

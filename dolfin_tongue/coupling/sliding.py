@@ -17,8 +17,9 @@ class SlidingNodes(Coupling):
     """The nodes of one `Sliding` and their multipliers.
 
     The force lambda dg/dy is stated at the stage, the condition g(y) = 0 at the end of the step,
-    like the volumes. Points of a quadratic displacement between the nodes, which do not start on a
-    curved surface, keep the value of g that they start with.
+    like the volumes; divided by the first |dg/dy|, so that its rows are lengths. Points of a
+    quadratic displacement between the nodes, which do not start on a curved surface, keep the value
+    of g that they start with.
     """
 
     def __init__(self, support: Sliding, space: MixedSpace, begin: int):
@@ -28,6 +29,7 @@ class SlidingNodes(Coupling):
         self.surface = support.surface
         self._dofs = np.concatenate([dofs for dofs, _ in groups])
         self._points = np.concatenate([corners[part].mean(axis=1) for _, part in groups])
+        self._scale = 1.0 / np.linalg.norm(self.surface.gradient(self._points), axis=1)
         self._start = self.surface.value(self._points)
         self._start[: len(nodes)] = 0.0
         self.multipliers = begin + np.arange(len(self._dofs))
@@ -40,7 +42,7 @@ class SlidingNodes(Coupling):
         force = at.state[self.multipliers][:, None] * self.surface.gradient(self._places(at.state))
         out[self._dofs] -= force
         end = self._places(at.end)
-        out[self.multipliers] = self.surface.value(end) - self._start
+        out[self.multipliers] = self._scale * (self.surface.value(end) - self._start)
 
     def pattern(self, entries: Sparse) -> Sparse:
         """Nodes with themselves and their multiplier."""
@@ -53,7 +55,7 @@ class SlidingNodes(Coupling):
         place, multiplier = self._places(at.state), at.state[self.multipliers]
         hessian = -multiplier[:, None, None] * self.surface.hessian(place)
         push = -self.surface.gradient(place)
-        slope = shifts.end * self.surface.gradient(self._places(at.end))
+        slope = shifts.end * self._scale[:, None] * self.surface.gradient(self._places(at.end))
         return matrix + self._blocks(matrix.shape[0], hessian, push, slope)
 
     def _blocks(

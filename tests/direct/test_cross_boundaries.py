@@ -17,15 +17,18 @@ from dolfin_tongue.boundary import (
     Sliding,
     moved_onto,
 )
+from dolfin_tongue.boundary.sliding import off_surface
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
 from dolfin_tongue.control import Constant, SmoothMove, Still, Swing
 from dolfin_tongue.direct import Direct, Implicit, Model, problem_of
+from dolfin_tongue.errors import BadScene
 from dolfin_tongue.geometry.simple import block_body, distort
 from dolfin_tongue.rigid import AngularSpring, LineMuscle, RigidBody
 from dolfin_tongue.scene import Scene
 from dolfin_tongue.state import State
 from dolfin_tongue.study import orders
-from dolfin_tongue.surfaces import Plane, Sphere
+from dolfin_tongue.surfaces import Cylinder, Plane, Sphere
+from dolfin_tongue.surfaces import Implicit as ImplicitSurface
 
 pytest.importorskip("dolfinx")
 
@@ -179,3 +182,54 @@ def test_a_body_may_come_up_behind_the_rim_of_a_sheet(solver, tmp_path):
     assert np.abs(fallen + 0.5 * 9.81 * 0.08**2).max() < 1e-5
     table = read_table(tmp_path / "steps.csv")
     assert table["contact_gap_m"].min() > 0
+
+
+def test_the_size_of_g_does_not_matter():
+    """The same bowl as a function of another scale and unit, in both solvers; lambda is smaller."""
+    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+
+    body = moved_onto(block_body((0.02, 0.02, 0.02), (2, 2, 2)), BOWL, "z0")
+    centre = np.asarray(BOWL.centre)
+    other = ImplicitSurface(lambda x: 1e7 * (BOWL.radius**2 - ((x - centre) ** 2).sum(axis=1)))
+    ends = []
+    for surface in (BOWL, other):
+        scene = Scene(body, (MooneyRivlin(), Gravity((3.0, 0.0, -9.0))), (Sliding(surface, "z0"),))
+        for solver in (Dynamics(scene, TimeSteps(5e-3)), Direct(scene, Implicit(5e-3))):
+            *_, last = solver.march(0.03)
+            places = (body.points + last.displacement)[body.nodes("z0")]
+            assert np.abs(off_surface(surface, places)).max() <= 1e-9
+            ends.append(last)
+    for one, two in zip(ends[:2], ends[2:], strict=True):
+        assert np.abs(one.displacement - two.displacement).max() < 1e-6
+        slope = np.linalg.norm(other.gradient(body.points[:1]))
+        assert np.abs(one.sliding).max() == pytest.approx(
+            slope * np.abs(two.sliding).max(), rel=0.1
+        )
+
+
+@pytest.mark.parametrize("solver", ["fenicsx", "direct"])
+def test_a_steady_push_creeps_through_the_reports_law(solver):
+    """(60) has no force at rest: it slows the block and lets it pass, alike in both solvers."""
+    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+
+    body = block_body((0.02, 0.02, 0.01), (2, 2, 1))
+    law = ReportContact(a1=3e6, range=5e-4)
+    wall = Contact(Plane((0.0, 0.0, -3e-4)), "z0", law)
+    scene = Scene(body, (MooneyRivlin(), Viscosity(20.0), Gravity(), wall))
+    stepper = (
+        Dynamics(scene, TimeSteps(4e-3)) if solver == "fenicsx" else Direct(scene, Implicit(4e-3))
+    )
+    heights = [state.displacement[body.nodes("z0"), 2].mean() for state in stepper.march(0.2)]
+    assert heights[-1] < -3.2e-4  # behind the plane
+    assert heights[-1] > -0.1 * 0.5 * 9.81 * 0.2**2  # far from free fall
+
+
+def test_an_obstacle_between_the_nodes_is_noticed():
+    """A wire under the middle of a face, which touches none of its nodes."""
+    body = block_body((0.02, 0.02, 0.02), (1, 1, 1))
+    wire = Cylinder((0.01, 0.0, -5e-4), (0.0, 1.0, 0.0), 1e-3)
+    assert wire.gap(body.points).distance.min() > 5e-3
+    with pytest.raises(
+        BadScene, match=r"3 of 9 points .* behind the obstacle, the deepest by 0.0005"
+    ):
+        Scene(body, (MooneyRivlin(), Contact(wire, "z0")))
