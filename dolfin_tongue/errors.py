@@ -119,3 +119,10 @@ def require_not_negative(owner: object, unit: str, **numbers: Any) -> None:
     for name, value in numbers.items():
         if not (is_number(value) and value >= 0):
             raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number >= 0", unit)
+
+
+def require_finite(owner: object, **numbers: Any) -> None:
+    """Raise OutOfRange unless every number is finite."""
+    for name, value in numbers.items():
+        if not is_number(value):
+            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number")

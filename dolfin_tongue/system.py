@@ -177,15 +177,15 @@ class System:
             self.rate.x.array[:] = rate[inside]
             self.acceleration.x.array[:] = acceleration[inside]
             self.end_state.x.array[:] = end_state[inside]
-        if rate is None or acceleration is None or end_state is None:
-            rate, acceleration, end_state = np.zeros_like(state), np.zeros_like(state), state
-        self._arrays = (time, (state, rate, acceleration, end_state))
+        self._arrays = (time, state, rate, acceleration, end_state)
 
     def arguments(self, time_end: float) -> Arguments:
         """Arguments that were set, for the couplings."""
-        time, parts = self._arrays
-        load = 1.0 if self.load is None else float(self.load.value)
-        return Arguments(time, time_end, *parts, load)
+        time, state, rate, acceleration, end = self._arrays
+        if rate is None or acceleration is None or end is None:
+            rest = np.zeros_like(state)
+            return Arguments(time, time_end, state, rest, rest, state, float(self.load.value))
+        return Arguments(time, time_end, state, rate, acceleration, end)
 
     def residual(self, time_end: float, out: FloatArray) -> None:
         """Residual at the arguments that were set; N in rows of u, m3 in rows of p."""

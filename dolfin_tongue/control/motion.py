@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dolfin_tongue.errors import BadScene, OutOfRange, is_number, require_positive
+from dolfin_tongue.errors import BadScene, require_finite, require_positive
 
 
 @runtime_checkable
@@ -55,7 +55,7 @@ class Still:
     value: float = 0.0
 
     def __post_init__(self) -> None:
-        _require_finite(self, value=self.value)
+        require_finite(self, value=self.value)
 
     def at(self, time: float) -> tuple[float, float, float]:
         """Value, rate, acceleration."""
@@ -80,7 +80,7 @@ class SmoothMove:
     duration: float = 0.2
 
     def __post_init__(self) -> None:
-        _require_finite(self, distance=self.distance, start=self.start)
+        require_finite(self, distance=self.distance, start=self.start)
         require_positive(self, "s", duration=self.duration)
 
     def at(self, time: float) -> tuple[float, float, float]:
@@ -112,7 +112,7 @@ class Swing:
     frequency: float
 
     def __post_init__(self) -> None:
-        _require_finite(self, amplitude=self.amplitude)
+        require_finite(self, amplitude=self.amplitude)
         require_positive(self, "Hz", frequency=self.frequency)
 
     def at(self, time: float) -> tuple[float, float, float]:
@@ -173,9 +173,3 @@ class Recorded:
     def breakpoints(self) -> tuple[float, ...]:
         """First and last time, s."""
         return (self.times[0], self.times[-1])
-
-
-def _require_finite(owner: object, **numbers: float) -> None:
-    for name, value in numbers.items():
-        if not is_number(value):
-            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number")

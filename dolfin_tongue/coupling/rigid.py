@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.coupling.base import Arguments, Coupling, Shifts, Sparse, scattered
+from dolfin_tongue.coupling.base import Arguments, Coupling, Shifts, Sparse
 from dolfin_tongue.mesh import MixedSpace
 from dolfin_tongue.rigid import plane
 from dolfin_tongue.rigid.loads import Loads
@@ -45,16 +45,6 @@ class RigidBodies(Coupling):
     def displacement(self, q: FloatArray) -> FloatArray:
         """Displacement of all attached dofs, shape (k, 3), m."""
         return plane.displacement(self._every_arm, q.reshape(-1, 3)[self._owner])
-
-    def _spread(self, blocks: list[FloatArray], size: int) -> Sparse:
-        """Blocks of shape (k, 3, 3), body after body, as a sparse matrix."""
-        rows, columns = [], []
-        for dofs, at in zip(self._dofs, self._at, strict=True):
-            rows.append(np.repeat(dofs.ravel(), 3))
-            columns.append(np.tile(np.arange(at.start, at.stop), dofs.size))
-        place = (np.concatenate(rows), np.concatenate(columns))
-        values = np.concatenate([block.ravel() for block in blocks])
-        return sp.coo_array((values, place), shape=(size, len(self.positions))).tocsr()
 
     def tissue_force(self, q: FloatArray, rows: FloatArray) -> FloatArray:
         """Return forces and moments of the tissue on the coordinates, shape (3b,), N and N m.
@@ -97,18 +87,10 @@ class RigidBodies(Coupling):
 
     def pattern(self, entries: Sparse) -> Sparse:
         """Own rows gather those of the nodes; nodes depend on their body."""
-        size = entries.shape[0]
         may = np.array([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 1.0, 1.0]])  # as in `plane`
-        spread = self._spread([np.tile(may, (len(dofs), 1, 1)) for dofs in self._dofs], size)
-        wide = self._placed(spread.T, size)
-        own = scattered(self.positions[:, None], self.positions, 1.0, size)
-        return entries + wide @ entries + wide.T + own
-
-    def _placed(self, rows: Sparse, size: int) -> Sparse:
-        """Rows (3b, size) at the places of the own rows in a square matrix."""
-        rows = rows.tocoo()
-        place = (self.positions[rows.coords[0]], rows.coords[1])
-        return sp.coo_array((rows.data, place), shape=(size, size)).tocsr()
+        T = np.tile(may, (len(self.dofs), 1, 1))
+        own = np.ones((len(self.positions), len(self.positions)))
+        return entries + self._entries(entries.shape[0], self._gathered(entries, T), T, own, 1.0)
 
     def with_tangent(
         self, matrix: Sparse, at: Arguments, shifts: Shifts, rows: FloatArray
@@ -117,14 +99,14 @@ class RigidBodies(Coupling):
         size = matrix.shape[0]
         q, v, a = self._own(at.state), self._own(at.rate), self._own(at.acceleration)
         inertia_q, inertia_v = self.loads.inertia_tangents(q, v, a)
-        _, force_q, force_v = self.loads.force_and_tangents(at.time, q, v)
+        force_q, force_v = self.loads.force_tangents(at.time, q, v)
         own = inertia_q - at.load * force_q + shifts.acceleration * self.loads.mass(q)
         own += shifts.rate * (inertia_v - at.load * force_v)
         for dofs, arms, part in zip(self._dofs, self._arms, self._at, strict=True):
             own[part.start + 2, part.start + 2] += np.sum(plane.bend(arms, q[part]) * rows[dofs])
         own[self._given] = 0.0
         own[self._given, self._given] = shifts.end
-        gathered = self._gathered(matrix, q)
+        gathered = self._gathered(matrix, self._jacobians(q))
         gathered[self._given] = 0.0
         follow = -shifts.end * self._jacobians(self._own(at.end))
         return self._replaced(matrix) + self._entries(size, gathered, follow, own, shifts.end)
@@ -133,12 +115,12 @@ class RigidBodies(Coupling):
         """T of all attached dofs, shape (k, 3, 3): component, then coordinate of its body."""
         return plane.jacobian(self._every_arm, q.reshape(-1, 3)[self._owner])
 
-    def _gathered(self, matrix: Sparse, q: FloatArray) -> FloatArray:
+    def _gathered(self, matrix: Sparse, T: FloatArray) -> FloatArray:
         """Rows of the nodes, times T^T, as rows of the coordinates; dense, shape (3b, size)."""
-        spread = np.zeros((self.dofs.size, len(q)))
+        spread = np.zeros((self.dofs.size, len(self.positions)))
         rows = np.arange(self.dofs.size).reshape(-1, 3)
         columns = 3 * self._owner[:, None, None] + np.arange(3)
-        spread[rows[:, :, None], columns] = self._jacobians(q)
+        spread[rows[:, :, None], columns] = T
         return (matrix[self.dofs.ravel()].T @ spread).T
 
     def _replaced(self, matrix: Sparse) -> Sparse:

@@ -78,10 +78,7 @@ class Bodies:
         angles = u[self.coordinates, 2]
         key = angles.tobytes()
         if key != self._key:
-            c, s = np.cos(angles)[self._owner], np.sin(angles)[self._owner]
-            arms = self._arms.copy()
-            arms[:, 0] = c * self._arms[:, 0] + s * self._arms[:, 2]
-            arms[:, 2] = c * self._arms[:, 2] - s * self._arms[:, 0]
+            arms = plane.turned(self._arms, angles[self._owner])
             count, first = np.arange(len(arms)), 3 * self._owner
             T = np.zeros((len(arms), 3, self.given.size))
             T[count, 0, first] = T[count, 2, first + 1] = 1.0
@@ -169,7 +166,7 @@ class Bodies:
         forces held.
         """
         at = self.coordinates
-        _, by_q, by_v = self.loads.force_and_tangents(time, u[at].ravel(), v[at].ravel())
+        by_q, by_v = self.loads.force_tangents(time, u[at].ravel(), v[at].ravel())
         bent = np.sum(self._turned(u)[2] * force[self.rows], axis=1)
         angles = 3 * np.arange(len(self.bodies)) + 2
         by_q[angles, angles] += np.bincount(self._owner, bent)

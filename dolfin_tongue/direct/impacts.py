@@ -24,10 +24,10 @@ from dolfin_tongue.errors import BadScene
 #: Energy that contact may make by errors of a method, over the largest energy so far, kinetic and
 #: stored in contacts.
 GAIN = 1e-2
-#: Factor by which a gap within the range may change in a step of an explicit method.
-LEAP = 2.0
 #: Time after which that is forgotten, s, so that a body that presses for long is not refused.
 MEMORY = 0.1
+#: Factor by which a gap within the range may change in a step of an explicit method.
+LEAP = 2.0
 
 
 class Refused(Exception):

@@ -1,7 +1,7 @@
 """Forces on rigid bodies as functions of state and time: F and N of (61), (62).
 
-Each is stated at points of bodies: forces f, N, with their derivatives by the points' positions and
-velocities; `loads.Loads` turns them into forces and moments on the coordinates.
+Each states a size (of a given force, a moment, a tension) and, where it depends on the state, its
+derivatives; `loads.Loads` turns them into forces and moments on the coordinates.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dolfin_tongue.control.sources import require_activation
 from dolfin_tongue.errors import (
     BadScene,
     OutOfRange,
-    is_number,
+    require_finite,
     require_not_negative,
     require_positive,
 )
@@ -33,9 +33,6 @@ SKULL = "skull"
 
 class RigidForce:
     """A force on one rigid body, or between two."""
-
-    #: The body at the far end of a line; SKULL where there is none.
-    to: str = SKULL
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -52,11 +49,13 @@ class RigidForce:
 class _Controlled(RigidForce):
     """Base of forces whose size may follow a control."""
 
+    control: Control | None = field(default=None, kw_only=True)
+
     def _level(self, time: float) -> float:
-        return 1.0 if self.control is None else self.control(time)  # type: ignore[attr-defined]
+        return 1.0 if self.control is None else self.control(time)
 
     def _check_control(self) -> None:
-        control = self.control  # type: ignore[attr-defined]
+        control = self.control
         if control is not None and (isinstance(control, type) or not isinstance(control, Control)):
             raise BadScene(
                 f"{type(self).__name__}.control must be a control, e.g. Ramp(1.0), not {control!r}"
@@ -65,12 +64,12 @@ class _Controlled(RigidForce):
     @property
     def breakpoints(self) -> tuple[float, ...]:
         """Those of the control, s."""
-        return () if self.control is None else self.control.breakpoints  # type: ignore[attr-defined]
+        return () if self.control is None else self.control.breakpoints
 
     @property
     def jumps(self) -> tuple[float, ...]:
         """Those of the control, s."""
-        return () if self.control is None else self.control.jumps  # type: ignore[attr-defined]
+        return () if self.control is None else self.control.jumps
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,6 @@ class PointForce(_Controlled):
 
     point: Vector
     force: Vector
-    control: Control | None = None
 
     def __post_init__(self) -> None:
         require_vector(self, "point", self.point)
@@ -119,10 +117,9 @@ class Moment(_Controlled, Turning):
     """
 
     moment: float
-    control: Control | None = None
 
     def __post_init__(self) -> None:
-        _require_finite(self, moment=self.moment)
+        require_finite(self, moment=self.moment)
         self._check_control()
 
     def generalised(
@@ -150,7 +147,7 @@ class AngularSpring(Turning):
     def __post_init__(self) -> None:
         require_not_negative(self, "N m/rad", stiffness=self.stiffness)
         require_not_negative(self, "N m s/rad", damping=self.damping)
-        _require_finite(self, rest=self.rest)
+        require_finite(self, rest=self.rest)
 
     def generalised(
         self, time: float, q: FloatArray, v: FloatArray
@@ -320,9 +317,3 @@ class LineMuscle(Line):
     def jumps(self) -> tuple[float, ...]:
         """Those of the activation, s."""
         return self.activation.jumps if self.activation else ()
-
-
-def _require_finite(owner: object, **numbers: float) -> None:
-    for name, value in numbers.items():
-        if not is_number(value):
-            raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number")

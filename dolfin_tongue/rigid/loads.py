@@ -39,7 +39,7 @@ class Loads:
         self.bodies, self.count = tuple(bodies), 3 * len(bodies)
         self._places = {body.name: slice(3 * i, 3 * i + 3) for i, body in enumerate(bodies)}
         self._centres = [body.arms(np.asarray(body.centre)) for body in bodies]
-        self._arms = np.concatenate([*self._centres, np.zeros((0, 3))])
+        self._arms = np.concatenate(self._centres)
         self._masses = np.array([body.mass for body in bodies])
         self._inertias = np.array([body.inertia for body in bodies])
         weights = [PointForce(body.centre, as_vector(body.mass * gravity)) for body in bodies]
@@ -61,14 +61,6 @@ class Loads:
             matrix[at, at] = body.mass * T.T @ T
             matrix[at.start + 2, at.start + 2] += body.inertia
         return matrix
-
-    def centrifugal(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Inertia force without accelerations, shape (3b,), N and N m."""
-        force = np.zeros(self.count)
-        for body, arm, at in self._each():
-            bent = plane.bend(arm, q[at])[0] * v[at][2] ** 2
-            force[at] = body.mass * plane.jacobian(arm, q[at])[0].T @ bent
-        return force
 
     def inertia(self, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
         """Inertia force on the coordinates, shape (3b,), N and N m."""
@@ -100,13 +92,6 @@ class Loads:
         """Kinetic energy, J."""
         return 0.5 * float(v @ self.mass(q) @ v)
 
-    def momentum(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Linear momentum of all bodies, shape (3,), N s."""
-        total = np.zeros(3)
-        for body, arm, at in self._each():
-            total += body.mass * plane.jacobian(arm, q[at])[0] @ v[at]
-        return total
-
     # -- forces --------------------------------------------------------------------------------
 
     def force(self, time: float, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -125,37 +110,23 @@ class Loads:
         """Arm of a force, shape (1, 3), m."""
         return body.arms(np.asarray(force.point))
 
-    def force_and_tangents(
+    def force_tangents(
         self, time: float, q: FloatArray, v: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the forces on the coordinates and their derivatives by q and v, (3b, 3b) each."""
-        out = (np.zeros(self.count), *np.zeros((2, self.count, self.count)))
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of `force` by q and v, shape (3b, 3b) each."""
+        by_q, by_v = np.zeros((2, self.count, self.count))
         for body, force in self._forces:
+            at = self._places[body.name]
             if isinstance(force, Turning):
-                at = self._places[body.name]
-                value, by_q, by_v = force.generalised(time, q[at], v[at])
-                out[0][at] += value
-                out[1][at, at] += by_q
-                out[2][at, at] += by_v
+                _, own_q, own_v = force.generalised(time, q[at], v[at])
+                by_q[at, at] += own_q
+                by_v[at, at] += own_v
             elif isinstance(force, PointForce):
-                self._add_point(body, force, time, q, out)
+                bent = plane.bend(self._point(body, force), q[at])[0]
+                by_q[at.start + 2, at.start + 2] += bent @ force.at(time)
             elif isinstance(force, Line):
-                self._add_line(body, force, time, q, v, out)
-            else:
-                raise TypeError(f"no rule for {type(force).__name__}")
-        return out
-
-    def _add_point(
-        self,
-        body: RigidBody,
-        force: PointForce,
-        time: float,
-        q: FloatArray,
-        out: tuple[FloatArray, FloatArray, FloatArray],
-    ) -> None:
-        at, arm, value = self._places[body.name], self._point(body, force), force.at(time)
-        out[0][at] += plane.jacobian(arm, q[at])[0].T @ value
-        out[1][at.start + 2, at.start + 2] += plane.bend(arm, q[at])[0] @ value
+                self._add_line(body, force, time, q, v, by_q, by_v)
+        return by_q, by_v
 
     def _add_line(
         self,
@@ -164,35 +135,34 @@ class Loads:
         time: float,
         q: FloatArray,
         v: FloatArray,
-        out: tuple[FloatArray, FloatArray, FloatArray],
+        by_q: FloatArray,
+        by_v: FloatArray,
     ) -> None:
-        """Tension T along n between both ends: force on the coordinates -T d(length)/dq."""
+        """Add the derivatives of -T d(length)/dq with the tension T (length, length rate)."""
         ends = [(body.name, line.point, -1.0), (line.to, line.anchor, 1.0)]
-        moving = [(name, point, sign) for name, point, sign in ends if name != SKULL]
         apart, rate = np.subtract(line.anchor, line.point), np.zeros(3)
-        by_q = np.zeros((3, self.count))  # d(apart)/dq
+        apart_q = np.zeros((3, self.count))  # d(apart)/dq
         bends: list[tuple[int, FloatArray]] = []
-        for name, point, sign in moving:
-            at, owner = self._places[name], self._body(name)
-            arm = owner.arms(np.asarray(point))
+        for name, point, sign in ends:
+            if name == SKULL:
+                continue
+            at, arm = self._places[name], self._body(name).arms(np.asarray(point))
             T = sign * plane.jacobian(arm, q[at])[0]
             apart = apart + sign * plane.displacement(arm, q[at])[0]
             rate = rate + T @ v[at]
-            by_q[:, at] = T
+            apart_q[:, at] = T
             bends.append((at.start + 2, sign * plane.bend(arm, q[at])[0]))
         length = float(np.linalg.norm(apart))
         n = apart / length
         tension, by_length, by_rate = line.tension(time, length, float(n @ rate))
-        slope = n @ by_q  # d(length)/dq, also d(length rate)/dv
-        across = (by_q - np.outer(n, slope)) / length  # dn/dq
-        second = by_q.T @ across
-        rate_slope = rate @ across
+        slope = n @ apart_q  # d(length)/dq, also d(length rate)/dv
+        across = (apart_q - np.outer(n, slope)) / length  # dn/dq
+        second, rate_slope = apart_q.T @ across, rate @ across
         for angle, bent in bends:
             second[angle, angle] += n @ bent
             rate_slope[angle] += n @ bent * v[angle]
-        out[0][:] -= tension * slope
-        out[1][:] -= np.outer(slope, by_length * slope + by_rate * rate_slope) + tension * second
-        out[2][:] -= by_rate * np.outer(slope, slope)
+        by_q -= np.outer(slope, by_length * slope + by_rate * rate_slope) + tension * second
+        by_v -= by_rate * np.outer(slope, slope)
 
     def _body(self, name: str) -> RigidBody:
         return next(body for body in self.bodies if body.name == name)
