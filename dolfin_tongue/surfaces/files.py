@@ -63,7 +63,7 @@ def _by_vtk(path: Path) -> tuple[FloatArray, IntArray]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             surface: Any = pyvista.read(path)
-    except Exception as error:
+    except Exception as error:  # the readers raise all kinds for a damaged file
         raise BadMesh(f"{path} cannot be read as a surface: {error}") from error
     if not isinstance(surface, pyvista.PolyData):
         surface = surface.extract_surface()

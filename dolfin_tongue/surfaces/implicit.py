@@ -196,7 +196,7 @@ class Implicit(Surface):
             return function(PROBES)
         except TongueError:
             raise
-        except Exception as error:
+        except Exception as error:  # whatever a user's function does
             raise OutOfRange(
                 f"Implicit.{name}", self.function, f"{KINDS}; it raises {error!r}"
             ) from error

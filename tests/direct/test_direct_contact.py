@@ -264,7 +264,8 @@ def test_a_step_through_the_whole_barrier_ends_before_the_plane(speed):
     solver = Direct(Scene(block(False, 1e-3, (1, 1, 1)), terms), Implicit(5e-3))
     run = Watched(solver, 0.02, falling(solver, speed))
     assert run.gap > 0
-    # The impact may make GAIN; the step resolves neither it nor the ringing of the block.
+    # TR-BDF2 takes the step: contact makes what GAIN allows, and the elastic forces, which turn
+    # within the step, do work of their own (0.6 % here; none with two cells per edge).
     assert run.energy.max() <= run.energy[0] * (1 + 2 * impacts.GAIN)
 
 
