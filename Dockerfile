@@ -32,10 +32,11 @@ RUN echo '==> pictures: pyvista, matplotlib, software OpenGL' \
  && apt-get clean && rm -rf /var/lib/apt/lists/* \
  && mkdir -p -m 1777 /tmp/.X11-unix
 
-RUN echo '==> checks: pytest, hypothesis, mypy' \
+RUN echo '==> checks: pytest, hypothesis, mypy, flake8' \
  && apt-get update \
  && apt-get install -y --no-install-recommends \
-      python3-pytest python3-hypothesis mypy \
+      python3-pytest python3-pytest-xdist python3-hypothesis mypy \
+      flake8 python3-flake8-docstrings isort \
  && apt-get clean && rm -rf /var/lib/apt/lists/*
 
 # One thread: the models are small, and the threads of a BLAS only wait for each other here.

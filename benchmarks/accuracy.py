@@ -17,26 +17,26 @@ from pathlib import Path
 
 import numpy as np
 
+from dolfin_tongue.anatomy.scenes import published_scene, report_tongue
+from dolfin_tongue.app.demo import CHECKOUT, Options
+from dolfin_tongue.base.errors import TongueError
+from dolfin_tongue.base.files import replacing, write_json, write_text
+from dolfin_tongue.body.shape import volume_ratios
 from dolfin_tongue.boundary import Attached
 from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import Constant, SmoothRamp
-from dolfin_tongue.demo import CHECKOUT, Options
-from dolfin_tongue.direct.implicit import Implicit
 from dolfin_tongue.direct.integrate import Adaptive, Direct, RungeKutta4
-from dolfin_tongue.errors import TongueError
-from dolfin_tongue.files import replacing, write_json, write_text
+from dolfin_tongue.direct.tr_bdf2 import Implicit
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+from dolfin_tongue.fenicsx.newton import Tolerances
+from dolfin_tongue.fenicsx.statics import Statics
+from dolfin_tongue.fenicsx.system import System
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.observe import EnergyAudit, local_volume_ratios, volume_changes
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.scenes import published_scene, report_tongue
-from dolfin_tongue.shape import volume_ratios
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.solve.newton import Tolerances
-from dolfin_tongue.solve.statics import Statics
-from dolfin_tongue.study import at_times, interpolated, landmark_path, peak_memory, timed
-from dolfin_tongue.system import System
+from dolfin_tongue.march.compare import at_times, interpolated, landmark_path, peak_memory, timed
+from dolfin_tongue.record.observe import EnergyAudit, local_volume_ratios, volume_changes
+from dolfin_tongue.scene.scene import Scene
 
 REPEATS = 3
 SAMPLE = 0.01  # s; every step used here divides it

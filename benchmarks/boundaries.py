@@ -10,18 +10,18 @@ from itertools import product
 import numpy as np
 
 from benchmarks.extremes import contacts, proofs
-from dolfin_tongue.bones import opening
+from dolfin_tongue.anatomy.bones import opening
+from dolfin_tongue.anatomy.scenes import SURROUNDINGS, report_mouth
+from dolfin_tongue.app.demo import Options
+from dolfin_tongue.base.files import write_json
 from dolfin_tongue.boundary.sliding import off_surface
 from dolfin_tongue.control import SmoothRamp
-from dolfin_tongue.demo import Options
 from dolfin_tongue.direct import Direct, Implicit
-from dolfin_tongue.files import write_json
-from dolfin_tongue.observe import EnergyAudit
-from dolfin_tongue.scenes import SURROUNDINGS, report_mouth
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.solve.newton import Tolerances
-from dolfin_tongue.study import orders, timed
-from dolfin_tongue.system import System
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+from dolfin_tongue.fenicsx.newton import Tolerances
+from dolfin_tongue.fenicsx.system import System
+from dolfin_tongue.march.compare import orders, timed
+from dolfin_tongue.record.observe import EnergyAudit
 
 SOLVERS = ("FEniCSx", "direct")
 REPEATS = 5

@@ -9,18 +9,18 @@ all nodes (cells), relative to the largest value of the reference.
 
 from dataclasses import astuple
 
+from dolfin_tongue.anatomy.scenes import published_scene, report_tongue
+from dolfin_tongue.app.demo import Options
+from dolfin_tongue.base.files import replacing, write_json, write_text
 from dolfin_tongue.control import Ramp, SmoothRamp
-from dolfin_tongue.demo import Options
-from dolfin_tongue.direct.implicit import Implicit
 from dolfin_tongue.direct.integrate import Adaptive, Direct
-from dolfin_tongue.files import replacing, write_json, write_text
+from dolfin_tongue.direct.tr_bdf2 import Implicit
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+from dolfin_tongue.fenicsx.newton import Tolerances
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
-from dolfin_tongue.scenes import published_scene, report_tongue
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.solve.newton import Tolerances
-from dolfin_tongue.state import State
-from dolfin_tongue.study import at_times, difference, orders, visiting
+from dolfin_tongue.march.compare import at_times, difference, orders, visiting
+from dolfin_tongue.march.state import State
 
 TIGHT = Tolerances(1e-12, 1e-12)
 REPORT_STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)

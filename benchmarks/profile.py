@@ -10,15 +10,15 @@ import time as clock
 import numpy as np
 from petsc4py import PETSc
 
+from dolfin_tongue.anatomy.scenes import report_tongue
+from dolfin_tongue.app.demo import Options
+from dolfin_tongue.base.files import write_json
 from dolfin_tongue.control import SmoothRamp
-from dolfin_tongue.demo import Options
-from dolfin_tongue.direct.implicit import Implicit
 from dolfin_tongue.direct.integrate import Direct
-from dolfin_tongue.files import write_json
+from dolfin_tongue.direct.tr_bdf2 import Implicit
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
-from dolfin_tongue.scenes import report_tongue
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.study import timed
+from dolfin_tongue.march.compare import timed
 
 REPEATS = 5
 REFERENCE_DT = 3.125e-4

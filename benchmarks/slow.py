@@ -4,8 +4,8 @@ import os
 import subprocess
 import sys
 
-from dolfin_tongue.demo import CHECKOUT, Options
-from dolfin_tongue.errors import TongueError
+from dolfin_tongue.app.demo import CHECKOUT, Options
+from dolfin_tongue.base.errors import TongueError
 
 
 def main(options: Options) -> dict[str, object]:

@@ -17,20 +17,20 @@ import numpy as np
 
 from benchmarks.extremes import charts, contacts, peers, scenes
 from benchmarks.extremes.outcome import Outcome, attempt_alpha2, attempt_march, read_table
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.anatomy.scenes import published_scene
+from dolfin_tongue.app.demo import Options
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.files import write_json, write_text
 from dolfin_tongue.control import Ramp, Step
-from dolfin_tongue.demo import Options
 from dolfin_tongue.direct import Adaptive, Implicit, RungeKutta4
 from dolfin_tongue.direct.integrate import Method
-from dolfin_tongue.files import write_json, write_text
+from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
+from dolfin_tongue.fenicsx.newton import Tolerances
+from dolfin_tongue.fenicsx.statics import Statics
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.scenes import published_scene
-from dolfin_tongue.solve.dynamics import TimeSteps
-from dolfin_tongue.solve.newton import Tolerances
-from dolfin_tongue.solve.statics import Statics
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import Scene
 
 FENICSX, DIRECT = "FEniCSx", "direct"
 AnyMethod = Method | TimeSteps

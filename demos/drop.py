@@ -10,17 +10,17 @@ from dataclasses import replace
 import numpy as np
 
 from dolfin_tongue import view
-from dolfin_tongue.body import Body
+from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.pictures import SHEET_FRAMES, read_table
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.faces import areas
 from dolfin_tongue.boundary import SurfaceTension
 from dolfin_tongue.constitutive import Viscosity
-from dolfin_tongue.demo import Options, progress_bar
 from dolfin_tongue.direct import Implicit, Model, drift, problem_of
-from dolfin_tongue.faces import areas
+from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.pictures import SHEET_FRAMES, read_table
-from dolfin_tongue.run import Run, simulate
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.dynamics import TimeSteps
+from dolfin_tongue.record.run import Run, simulate
+from dolfin_tongue.scene.scene import Scene
 
 EDGE = 0.02  # m
 SIGMA = 0.01  # N/m

@@ -6,11 +6,11 @@ prescribed motion, while the hyoid moves freely in its ligaments: the tissue pul
 
 from math import degrees
 
-from dolfin_tongue.bones import opening
-from dolfin_tongue.demo import Options, progress_bar
-from dolfin_tongue.pictures import picture_run
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scenes import report_mouth
+from dolfin_tongue.anatomy.bones import opening
+from dolfin_tongue.anatomy.scenes import report_mouth
+from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.pictures import picture_run
+from dolfin_tongue.record.run import simulate
 
 END = 0.6
 OPENS_AT = 0.2

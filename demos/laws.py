@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import ufl
 
+from dolfin_tongue.base.units import kPa
+from dolfin_tongue.body.fibres import FloatArray
 from dolfin_tongue.constitutive import SPECIFIC_TENSION, ReportTissue, StressMobilisation
-from dolfin_tongue.fibres import FloatArray
-from dolfin_tongue.units import kPa
 from dolfin_tongue.view.plots import COLOURS, new_figure, save_figure, style
 
 TISSUE, MUSCLE = ReportTissue(), StressMobilisation()
@@ -82,7 +82,7 @@ def main(options: Any) -> dict[str, float]:
 
     Parameters
     ----------
-    options : what `dolfin_tongue.demo` gives, or the folder for the pictures itself.
+    options : what `dolfin_tongue.app.demo` gives, or the folder for the pictures itself.
     """
     folder = Path(getattr(options, "folder", options))
     with style():

@@ -7,13 +7,13 @@ palate, jaw and hyoid.
 
 from math import degrees
 
-from dolfin_tongue.bones import GLIDE, OPENING
+from dolfin_tongue.anatomy.bones import GLIDE, OPENING
+from dolfin_tongue.anatomy.scenes import published_mouth, report_mouth
+from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.pictures import picture_run, read_table
 from dolfin_tongue.control import Recorded, SmoothRamp
-from dolfin_tongue.demo import Options, progress_bar
-from dolfin_tongue.pictures import picture_run, read_table
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.scenes import published_mouth, report_mouth
+from dolfin_tongue.record.run import simulate
+from dolfin_tongue.scene.scene import Scene
 
 END = 0.6
 #: Share of 10 degrees of opening over time, s.

@@ -4,13 +4,13 @@ Every run starts from rest under gravity; the table gives how far tip, dorsum an
 there. x points back, z up: a negative x is forward.
 """
 
+from dolfin_tongue.anatomy.scenes import report_tongue
+from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.pictures import picture_shapes
+from dolfin_tongue.base.files import write_text
 from dolfin_tongue.control import Ramp
-from dolfin_tongue.demo import Options, progress_bar
-from dolfin_tongue.files import write_text
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
-from dolfin_tongue.pictures import picture_shapes
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scenes import report_tongue
+from dolfin_tongue.record.run import simulate
 
 END = 0.8
 ACTIVATED_AT = 0.4

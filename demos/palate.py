@@ -4,11 +4,11 @@ Both muscles rise within 300 ms. The gap between tongue and palate closes from t
 dorsum, the patch in contact grows, and neither comes through the other.
 """
 
+from dolfin_tongue.anatomy.scenes import report_mouth
+from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.pictures import picture_run, read_table
 from dolfin_tongue.control import SmoothRamp
-from dolfin_tongue.demo import Options, progress_bar
-from dolfin_tongue.pictures import picture_run, read_table
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scenes import report_mouth
+from dolfin_tongue.record.run import simulate
 
 END = 0.5
 LEVELS = {"genioglossus_posterior": 1.0, "styloglossus": 0.6}

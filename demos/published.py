@@ -4,12 +4,12 @@ Its mesh, muscles and attachments are read from a folder with tongue.vtu, muscle
 attachments.json. It rests under gravity for 200 ms before GGP rises to 50 % within 50 ms.
 """
 
+from dolfin_tongue.anatomy.scenes import published_scene
+from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.pictures import picture_run
 from dolfin_tongue.control import Ramp
-from dolfin_tongue.demo import Options, progress_bar
 from dolfin_tongue.geometry.published import published_tongue
-from dolfin_tongue.pictures import picture_run
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scenes import published_scene
+from dolfin_tongue.record.run import simulate
 
 END = 0.5
 ACTIVATED_AT = 0.2

@@ -4,12 +4,12 @@ For 500 ms the tongue sags to rest under gravity. Then all eight muscles are act
 way, to 50 % within 100 ms, and the tongue moves to another equilibrium.
 """
 
+from dolfin_tongue.anatomy.scenes import report_tongue
+from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.pictures import picture_run
 from dolfin_tongue.control import SmoothRamp
-from dolfin_tongue.demo import Options, progress_bar
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
-from dolfin_tongue.pictures import picture_run
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scenes import report_tongue
+from dolfin_tongue.record.run import simulate
 
 END = 1.0
 ACTIVATED_AT = 0.5

@@ -1,5 +1,5 @@
 """``python3 -m dolfin_tongue``."""
 
-from dolfin_tongue.cli import app
+from dolfin_tongue.app.cli import app
 
 app()

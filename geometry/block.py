@@ -15,8 +15,8 @@ from itertools import product
 import gmsh
 import numpy as np
 
-from dolfin_tongue.errors import BadMesh, OutOfRange
-from dolfin_tongue.fibres import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadMesh, OutOfRange
+from dolfin_tongue.body.fibres import FloatArray, IntArray
 
 #: Parent elements along r, s and t (report, fig. 11).
 DIVISIONS = (7, 3, 2)

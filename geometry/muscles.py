@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dolfin_tongue.fibres import Fibres, FloatArray, IntArray, MuscleFibres
+from dolfin_tongue.base.units import mm
+from dolfin_tongue.body.fibres import Fibres, FloatArray, IntArray, MuscleFibres
+from dolfin_tongue.body.shape import gauss_jacobians
 from dolfin_tongue.geometry.bezier import BezierSolid
 from dolfin_tongue.geometry.block import DIVISIONS, Block
-from dolfin_tongue.shape import gauss_jacobians
-from dolfin_tongue.units import mm
 
 Parent = tuple[int, int, int]
 

@@ -19,19 +19,19 @@ import gmsh
 import numpy as np
 from scipy.special import ellipe
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import LARGEST_SIZE
-from dolfin_tongue.errors import (
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import (
     BadScene,
     OutOfRange,
     is_number,
     require_not_negative,
     require_positive,
 )
+from dolfin_tongue.base.units import mm
+from dolfin_tongue.body.body import LARGEST_SIZE
 from dolfin_tongue.geometry.block import gmsh_model
 from dolfin_tongue.surfaces.triangles import area_vectors
 from dolfin_tongue.surfaces.triangulated import Triangulated
-from dolfin_tongue.units import mm
 
 #: How the roof sinks behind its top: the power of the share of the way to the velum's edge.
 SINKING = 2.5

@@ -14,13 +14,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from dolfin_tongue.body import TISSUE_DENSITY, Body
-from dolfin_tongue.errors import BadMesh
-from dolfin_tongue.fibres import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadMesh
+from dolfin_tongue.base.units import mm
+from dolfin_tongue.body.body import TISSUE_DENSITY, Body
+from dolfin_tongue.body.fibres import FloatArray, IntArray
 from dolfin_tongue.geometry.bezier import BezierSolid
 from dolfin_tongue.geometry.block import DIVISIONS, Block, Box, unit_block
 from dolfin_tongue.geometry.muscles import block_fibres
-from dolfin_tongue.units import mm
 
 #: Control points of the right half, mm. One block per control plane from root to tip (report,
 #: fig. 12), its rows from the underside up: x, y, z near the middle, then x, y, z at the side.

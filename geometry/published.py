@@ -21,11 +21,11 @@ from typing import Any, Literal
 import meshio
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import TISSUE_DENSITY, Body
-from dolfin_tongue.errors import BadMesh, OutOfRange, TongueError
-from dolfin_tongue.fibres import SPECIFIC_TENSION, Fibres, MuscleFibres
-from dolfin_tongue.units import kPa
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadMesh, OutOfRange, TongueError
+from dolfin_tongue.base.units import kPa
+from dolfin_tongue.body.body import TISSUE_DENSITY, Body
+from dolfin_tongue.body.fibres import SPECIFIC_TENSION, Fibres, MuscleFibres
 
 #: Files of the folder.
 FILES = ("tongue.vtu", "muscles.json", "attachments.json")

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfin_tongue.body import TISSUE_DENSITY, Body
-from dolfin_tongue.errors import BadMesh, OutOfRange
-from dolfin_tongue.faces import faces_between, outer_faces
-from dolfin_tongue.fibres import Fibres, FloatArray, IntArray, MuscleFibres
-from dolfin_tongue.shape import FACES
+from dolfin_tongue.base.errors import BadMesh, OutOfRange
+from dolfin_tongue.body.body import TISSUE_DENSITY, Body
+from dolfin_tongue.body.faces import faces_between, outer_faces
+from dolfin_tongue.body.fibres import Fibres, FloatArray, IntArray, MuscleFibres
+from dolfin_tongue.body.shape import FACES
 
 
 def brick_cells(cells: Sequence[int]) -> IntArray:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.constitutive import StressMobilisation
-from dolfin_tongue.errors import OutOfRange
 
 
 def test_length_factor_has_its_maximum_one_at_stretch_one():

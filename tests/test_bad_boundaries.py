@@ -5,17 +5,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dolfin_tongue.bones import mandible, opening
+from dolfin_tongue.anatomy.bones import mandible, opening
+from dolfin_tongue.anatomy.scenes import published_mouth, report_mouth
+from dolfin_tongue.base.errors import BadMesh, BadScene, OutOfRange, UnknownName
 from dolfin_tongue.boundary import Attached, Contact, Gravity
 from dolfin_tongue.boundary.contact import Barrier, ReportContact
 from dolfin_tongue.boundary.sliding import Sliding, moved_onto
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.control import Ramp, Recorded, SmoothMove, Still
 from dolfin_tongue.direct.integrate import RungeKutta4
-from dolfin_tongue.errors import BadMesh, BadScene, OutOfRange, UnknownName
 from dolfin_tongue.geometry.palate import Palate, report_palate
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.output import fingerprint
+from dolfin_tongue.record.recorder import fingerprint
+from dolfin_tongue.record.run import simulate
 from dolfin_tongue.rigid import (
     AngularSpring,
     LineMuscle,
@@ -25,9 +27,7 @@ from dolfin_tongue.rigid import (
     Spring,
     StateForce,
 )
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.scenes import published_mouth, report_mouth
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import (
     Cylinder,
     Implicit,

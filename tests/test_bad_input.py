@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dolfin_tongue.base.errors import BadMesh, BadScene, OutOfRange, UnknownName
+from dolfin_tongue.body.fibres import Fibres, MuscleFibres
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import (
     ActiveMuscles,
@@ -14,11 +16,9 @@ from dolfin_tongue.constitutive import (
     Viscosity,
 )
 from dolfin_tongue.control import Constant, Ramp, SmoothRamp, Step, Table
-from dolfin_tongue.errors import BadMesh, BadScene, OutOfRange, UnknownName
-from dolfin_tongue.fibres import Fibres, MuscleFibres
+from dolfin_tongue.fenicsx.statics import Statics
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.statics import Statics
+from dolfin_tongue.scene.scene import Scene
 
 BODY = block_body((0.03, 0.01, 0.01), (3, 1, 1), muscles={"genioglossus": (1.0, 0.0, 0.0)})
 

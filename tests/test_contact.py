@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from dolfin_tongue.base.errors import BadScene, OutOfRange, UnknownName
 from dolfin_tongue.boundary import Attached, Barrier, Contact, Gravity, ReportContact
 from dolfin_tongue.constitutive import ReportTissue, Viscosity
 from dolfin_tongue.control import SmoothMove, Still
-from dolfin_tongue.errors import BadScene, OutOfRange, UnknownName
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+from dolfin_tongue.fenicsx.mesh import PAIRS
+from dolfin_tongue.fenicsx.newton import Tolerances
+from dolfin_tongue.fenicsx.statics import Statics
+from dolfin_tongue.fenicsx.system import System
 from dolfin_tongue.geometry.simple import block_body, distort
-from dolfin_tongue.mesh import PAIRS
-from dolfin_tongue.observe import EnergyAudit, contact_pressures
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.solve.newton import Tolerances
-from dolfin_tongue.solve.statics import Statics
+from dolfin_tongue.record.observe import EnergyAudit, contact_pressures
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Cylinder, Plane, Sphere
-from dolfin_tongue.system import System
 
 RANGE, STEEP = 2e-4, 50.0
 

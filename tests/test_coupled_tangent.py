@@ -19,7 +19,7 @@ from dolfin_tongue.constitutive import ReportTissue, Viscosity
 from dolfin_tongue.control import Constant, Still, Swing
 from dolfin_tongue.geometry.simple import block_body
 from dolfin_tongue.rigid import AngularSpring, LineMuscle, RigidBody, Spring
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Plane, Sphere
 
 pytest.importorskip("dolfinx")
@@ -55,7 +55,7 @@ def test_jacobian_is_the_derivative_of_the_residual(pair):
     """Central differences at a random state, each kind of row by its own size."""
     from petsc4py import PETSc
 
-    from dolfin_tongue.system import System
+    from dolfin_tongue.fenicsx.system import System
 
     system = System(crowded_scene(), dynamic=True, pair=pair)
     rng = np.random.default_rng(0)

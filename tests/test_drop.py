@@ -13,16 +13,16 @@ from dolfinx import fem
 from scipy.optimize import curve_fit, root
 from scipy.special import jv
 
-from dolfin_tongue import demo
-from dolfin_tongue.body import Body
+from dolfin_tongue.app import demo
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.faces import areas
 from dolfin_tongue.boundary import SurfaceTension
 from dolfin_tongue.constitutive import Viscosity
 from dolfin_tongue.direct import Adaptive, Direct, Implicit, Model, drift, problem_of
-from dolfin_tongue.faces import areas
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 from dolfin_tongue.geometry.simple import ball_body, block_body
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import Scene
 
 SIGMA, DENSITY = 0.1, 1000.0
 

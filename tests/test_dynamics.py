@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dolfin_tongue.base.errors import BadScene, NotConverged, OutOfRange
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import Ramp, SmoothRamp, Step
-from dolfin_tongue.errors import BadScene, NotConverged, OutOfRange
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+from dolfin_tongue.fenicsx.newton import Tolerances
+from dolfin_tongue.fenicsx.statics import Statics
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.observe import EnergyAudit, volume_changes
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.solve.newton import Tolerances
-from dolfin_tongue.solve.statics import Statics
+from dolfin_tongue.record.observe import EnergyAudit, volume_changes
+from dolfin_tongue.record.run import simulate
+from dolfin_tongue.scene.scene import Scene
 
 TIGHT = Tolerances(1e-12, 1e-12)
 BODY = block_body((0.04, 0.02, 0.02), (3, 2, 2), muscles={"along": (1.0, 0.0, 0.3)})
@@ -301,8 +301,8 @@ def test_damaged_files_are_named_when_a_run_is_resumed(tmp_path, name):
 
 
 def test_two_runs_cannot_share_a_folder(tmp_path):
-    from dolfin_tongue.errors import TongueError
-    from dolfin_tongue.output import Recorder
+    from dolfin_tongue.base.errors import TongueError
+    from dolfin_tongue.record.recorder import Recorder
 
     scene = muscle_scene(Ramp(0.2))
     first = Recorder(tmp_path, scene, 0.01)
@@ -313,7 +313,7 @@ def test_two_runs_cannot_share_a_folder(tmp_path):
 
 
 def test_looking_at_a_body_does_not_change_its_fingerprint():
-    from dolfin_tongue.output import fingerprint
+    from dolfin_tongue.record.recorder import fingerprint
 
     first, second = muscle_scene(Ramp(0.2)), muscle_scene(Ramp(0.2))
     assert second.body.mass > 0 and second.body.scaled_jacobians.min() > 0
@@ -321,14 +321,14 @@ def test_looking_at_a_body_does_not_change_its_fingerprint():
 
 
 def test_a_killed_compilation_does_not_block_the_next(tmp_path, monkeypatch):
-    from dolfin_tongue.compile import cache_folder
+    from dolfin_tongue.fenicsx.compile import cache_folder
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folder = cache_folder()
     folder.mkdir(parents=True)
     orphan = folder / "libffcx_forms_0.c"
     orphan.write_text("half")
-    from dolfin_tongue.system import System
+    from dolfin_tongue.fenicsx.system import System
 
     System(Scene(BODY, (Gravity(),)), True)
     assert not orphan.exists()

@@ -11,7 +11,8 @@ import gmsh
 import numpy as np
 import pytest
 
-from dolfin_tongue.errors import BadMesh, OutOfRange
+from dolfin_tongue.base.errors import BadMesh, OutOfRange
+from dolfin_tongue.body.shape import gauss_jacobians
 from dolfin_tongue.geometry.bezier import BezierSolid, bernstein
 from dolfin_tongue.geometry.block import DIVISIONS, unit_block
 from dolfin_tongue.geometry.muscles import (
@@ -32,7 +33,6 @@ from dolfin_tongue.geometry.published import (
     read_activations,
 )
 from dolfin_tongue.geometry.simple import block_body, distort, surface_nodes
-from dolfin_tongue.shape import gauss_jacobians
 
 
 def lattice_control_points(shape: tuple[int, int, int]) -> np.ndarray:

@@ -11,10 +11,10 @@ from dolfin_tongue.boundary import Attached, Barrier, Contact
 from dolfin_tongue.constitutive import MooneyRivlin
 from dolfin_tongue.control import SmoothMove, Still
 from dolfin_tongue.direct import Model, problem_of
+from dolfin_tongue.fenicsx.newton import Tolerances
+from dolfin_tongue.fenicsx.statics import Statics
 from dolfin_tongue.geometry.simple import ball_body
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.newton import Tolerances
-from dolfin_tongue.solve.statics import Statics
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Plane
 
 BALL, MU = 0.01, 1000.0

@@ -7,12 +7,12 @@ from math import radians
 import numpy as np
 import pytest
 
-from dolfin_tongue.bones import opening
+from dolfin_tongue.anatomy.bones import opening
+from dolfin_tongue.anatomy.scenes import CLEARANCE, SURROUNDINGS, published_mouth, report_mouth
+from dolfin_tongue.base.errors import TongueError
 from dolfin_tongue.boundary import Contact
 from dolfin_tongue.control import SmoothRamp
 from dolfin_tongue.direct import Direct, Implicit
-from dolfin_tongue.errors import TongueError
-from dolfin_tongue.scenes import CLEARANCE, SURROUNDINGS, published_mouth, report_mouth
 
 pytest.importorskip("dolfinx")
 
@@ -24,7 +24,7 @@ PRESSED = {
 
 def last_of(scene, end, dt, name):
     """Last state of one of the solvers."""
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     solver = Dynamics(scene, TimeSteps(dt)) if name == "fenicsx" else Direct(scene, Implicit(dt))
     *_, last = solver.march(end)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks.extremes.proofs import hinged_bone
+from dolfin_tongue.base.errors import BadScene, OutOfRange, UnknownName
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
 from dolfin_tongue.control import Constant, Ramp, Recorded, SmoothMove, Step, Still, Swing
-from dolfin_tongue.errors import BadScene, OutOfRange, UnknownName
 from dolfin_tongue.geometry.simple import block_body
 from dolfin_tongue.rigid import (
     AngularSpring,
@@ -25,7 +25,7 @@ from dolfin_tongue.rigid import (
     plane,
 )
 from dolfin_tongue.rigid.loads import Loads
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene.scene import Scene
 
 BLOCK = block_body((0.03, 0.02, 0.02), (3, 2, 2))
 TISSUE = MooneyRivlin()
@@ -156,7 +156,7 @@ def test_rates_of_motions_are_their_derivatives(motion):
 def test_free_bone_and_block_keep_their_momentum():
     """An internal muscle pulls, the block vibrates, nothing acts from outside."""
     pytest.importorskip("dolfinx")
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     other = RigidBody("other", ("x1",), 0.01, 1e-6, (0.04, 0.01, 0.01))
     pull = LineMuscle(
@@ -191,8 +191,8 @@ def nodal_mass(body):
 def test_bone_feels_what_it_exerts():
     """Mass times acceleration of a pushed bone is its forces minus what the nodes need."""
     pytest.importorskip("dolfinx")
-    from dolfin_tongue.coupling import RigidBodies
-    from dolfin_tongue.solve.statics import Statics
+    from dolfin_tongue.fenicsx.couplings import RigidBodies
+    from dolfin_tongue.fenicsx.statics import Statics
 
     spring = Spring((-0.01, 0.01, 0.015), (-0.05, 0.01, 0.015), stiffness=50.0)
     stop = AngularSpring(1.0)
@@ -224,7 +224,7 @@ def test_bone_feels_what_it_exerts():
 
 def test_pendulum_with_a_soft_block_is_of_order_two():
     pytest.importorskip("dolfinx")
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     def last(dt: float) -> np.ndarray:
         for state in Dynamics(hinged_bone(), TimeSteps(dt)).march(0.08):
@@ -242,8 +242,8 @@ def test_pendulum_with_a_soft_block_is_of_order_two():
 
 def test_opening_of_a_jaw_is_followed_exactly_and_its_work_is_known():
     pytest.importorskip("dolfinx")
-    from dolfin_tongue.observe import EnergyAudit
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.record.observe import EnergyAudit
 
     opening = {"x": Still(), "z": Still(), "angle": SmoothMove(radians(-10.0), 0.0, 0.2)}
     scene = Scene(
@@ -275,7 +275,7 @@ def test_opening_of_a_jaw_is_followed_exactly_and_its_work_is_known():
 def test_light_and_heavy_mandibles_march(mass):
     """The tissue that hangs on it weighs 12 g."""
     pytest.importorskip("dolfinx")
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     spring = Spring((-0.01, 0.01, 0.015), (-0.01, 0.01, 0.1), stiffness=100.0 * mass, damping=mass)
     bone = carrier(mass=mass, inertia=1e-4 * mass, forces=(spring, AngularSpring(0.01)))
@@ -355,10 +355,10 @@ def test_bad_combinations_are_refused():
 def test_runs_record_bones_and_resume(solver, tmp_path):
     """A run that is taken up again goes on with the coordinates that were there."""
     pytest.importorskip("dolfinx")
+    from dolfin_tongue.app.pictures import read_table
     from dolfin_tongue.direct import Implicit
-    from dolfin_tongue.pictures import read_table
-    from dolfin_tongue.run import simulate
-    from dolfin_tongue.solve.dynamics import TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
+    from dolfin_tongue.record.run import simulate
 
     steps = TimeSteps(2e-3) if solver == "fenicsx" else Implicit(2e-3)
     scene = hinged_bone()

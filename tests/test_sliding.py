@@ -16,12 +16,12 @@ from benchmarks.extremes.proofs import (
     period_of,
     swing_angles,
 )
+from dolfin_tongue.base.errors import BadMesh, BadScene, UnknownName
 from dolfin_tongue.boundary import Attached, Gravity, Sliding, moved_onto
 from dolfin_tongue.boundary.sliding import off_surface
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
-from dolfin_tongue.errors import BadMesh, BadScene, UnknownName
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Plane, Sphere
 
 pytest.importorskip("dolfinx")
@@ -30,8 +30,8 @@ pytest.importorskip("dolfinx")
 @pytest.fixture(scope="module")
 def swing():
     """Angles of the centre of mass over a period, at two steps, with audits."""
-    from dolfin_tongue.observe import EnergyAudit
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.record.observe import EnergyAudit
 
     scene = block_in_bowl()
     period, nodes = exact_period(scene), scene.body.nodes("z0")
@@ -73,7 +73,7 @@ def test_energy_is_kept_but_for_the_damping_of_time_stepping(swing):
 
 def test_no_tangential_force():
     """A viscous block on a tilted plane falls along it as if it were free."""
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     body = block_body((0.02, 0.02, 0.02), (2, 2, 2))
     plane = Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -93,7 +93,7 @@ def test_no_tangential_force():
 
 def test_static_block_hangs_from_a_sliding_support():
     """A block that is held on one side and slides on a plane below: multipliers are reactions."""
-    from dolfin_tongue.solve.statics import Statics
+    from dolfin_tongue.fenicsx.statics import Statics
 
     body = block_body((0.02, 0.02, 0.02), (2, 2, 2))
     sets = {**body.node_sets, "foot": np.setdiff1d(body.nodes("z0"), body.nodes("x0"))}

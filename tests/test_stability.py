@@ -11,15 +11,15 @@ import pytest
 
 from benchmarks.extremes import charts, contacts, peers, scenes
 from benchmarks.extremes.outcome import FILES, KEPT, attempt_alpha2, attempt_march, short_cause
-from dolfin_tongue import demo
+from dolfin_tongue.anatomy.scenes import published_scene
+from dolfin_tongue.app import demo
 from dolfin_tongue.control import Ramp, Step
 from dolfin_tongue.direct import Implicit, RungeKutta4
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+from dolfin_tongue.fenicsx.statics import Statics
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
-from dolfin_tongue.scenes import published_scene
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.solve.statics import Statics
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
 
 BOTH = (TimeSteps(5e-3), Implicit(5e-3))
 IDS = ("alpha2", "implicit")

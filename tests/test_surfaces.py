@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from dolfinx import fem
 
+from dolfin_tongue.base.errors import BadMesh, OutOfRange, UnknownName
+from dolfin_tongue.body.faces import areas
 from dolfin_tongue.boundary import Attached, Skin, SurfaceTension
 from dolfin_tongue.constitutive import ReportTissue, Viscosity
 from dolfin_tongue.direct import Model, Problem, problem_of
-from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName
-from dolfin_tongue.faces import areas
+from dolfin_tongue.fenicsx.mesh import PAIRS
+from dolfin_tongue.fenicsx.statics import Statics
+from dolfin_tongue.fenicsx.system import System
 from dolfin_tongue.geometry.simple import ball_body, block_body
-from dolfin_tongue.mesh import PAIRS
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.statics import Statics
-from dolfin_tongue.system import System
+from dolfin_tongue.scene.scene import Scene
 
 BODY = block_body((0.03, 0.02, 0.01), (3, 2, 1))
 
@@ -186,8 +186,8 @@ def test_inflated_skin_and_static_film_find_equilibrium():
 
 
 def test_the_energy_audit_counts_surfaces():
-    from dolfin_tongue.observe import EnergyAudit
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.record.observe import EnergyAudit
 
     scene = Scene(BODY, (ReportTissue(), Viscosity(20.0), SurfaceTension(1.0), Skin(5e3, 1e-3)))
     errors = []

@@ -12,7 +12,8 @@ import pytest
 pytest.importorskip("pyvista")
 from PIL import Image
 
-from dolfin_tongue import pictures, view
+from dolfin_tongue import view
+from dolfin_tongue.app import pictures
 from dolfin_tongue.boundary import Attached, Contact, Sliding
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.control import Ramp
@@ -20,10 +21,10 @@ from dolfin_tongue.control.motion import SmoothMove, Still
 from dolfin_tongue.geometry.palate import report_palate
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.simple import block_body
+from dolfin_tongue.march.state import State
+from dolfin_tongue.record.run import Run
 from dolfin_tongue.rigid import LineMuscle, RigidBody, Spring, plane
-from dolfin_tongue.run import Run
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Implicit, Plane, Sphere
 from dolfin_tongue.view import contact as contact_view
 from dolfin_tongue.view.bones import MUSCLE, Skeleton, best_fit, hull, zigzag

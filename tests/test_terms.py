@@ -24,10 +24,10 @@ from dolfin_tongue.constitutive import (
     Viscosity,
 )
 from dolfin_tongue.control import Constant
+from dolfin_tongue.fenicsx.system import System
 from dolfin_tongue.geometry.simple import block_body, distort
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.system import System
-from dolfin_tongue.term import EnergyTerm, Term
+from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.terms.term import EnergyTerm, Term
 
 MUSCLES = {"along": (1.0, 0.0, 0.0), "across": (0.0, 0.6, 0.8)}
 TERMS = {
@@ -360,7 +360,7 @@ def test_volume_rows_are_the_volume_changes():
     system = system_of("report")
     y, v, a = random_states(system)
     change = system.volume_change(residual(system, y, v, a))
-    from dolfin_tongue.observe import volume_changes
+    from dolfin_tongue.record.observe import volume_changes
 
     body = system.scene.body
     expected = volume_changes(body, system.displacement(y))
@@ -369,8 +369,8 @@ def test_volume_rows_are_the_volume_changes():
 
 
 def test_det_f_by_ufl_is_that_of_the_node_positions():
-    from dolfin_tongue.observe import local_volume_ratios
-    from dolfin_tongue.shape import volume_ratios
+    from dolfin_tongue.body.shape import volume_ratios
+    from dolfin_tongue.record.observe import local_volume_ratios
 
     system = system_of("report")
     y, v, _ = random_states(system)

@@ -8,12 +8,12 @@ import json
 import numpy as np
 import pytest
 
-from dolfin_tongue import demo
+from dolfin_tongue.anatomy.scenes import published_scene, report_tongue
+from dolfin_tongue.app import demo
 from dolfin_tongue.control import Constant
+from dolfin_tongue.fenicsx.statics import Statics
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
-from dolfin_tongue.observe import volume_changes
-from dolfin_tongue.scenes import published_scene, report_tongue
-from dolfin_tongue.solve.statics import Statics
+from dolfin_tongue.record.observe import volume_changes
 
 MM = 1e-3
 

@@ -14,10 +14,10 @@ pytest.importorskip("pyvista")
 from PIL import Image
 
 from dolfin_tongue import view
-from dolfin_tongue.errors import BadMesh, OutOfRange, UnknownName
+from dolfin_tongue.base.errors import BadMesh, OutOfRange, UnknownName
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
 from dolfin_tongue.view import display
 from dolfin_tongue.view.camera import Camera, View
 from dolfin_tongue.view.canvas import nice_below, spoken

@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import NotConverged, TongueError
 from dolfin_tongue.direct.integrate import Direct, Method
-from dolfin_tongue.errors import NotConverged, TongueError
-from dolfin_tongue.observe import volume_changes
-from dolfin_tongue.output import Recorder
-from dolfin_tongue.run import simulate
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
-from dolfin_tongue.state import State
+from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+from dolfin_tongue.march.state import State
+from dolfin_tongue.record.observe import volume_changes
+from dolfin_tongue.record.recorder import Recorder
+from dolfin_tongue.record.run import simulate
+from dolfin_tongue.scene.scene import Scene
 
 #: Largest relative volume change of a cell of which we say that the volumes are kept.
 KEPT = 1e-8

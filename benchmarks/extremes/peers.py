@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.extremes.outcome import read_table
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 
 VARIABLE = "DOLFIN_TONGUE_PEERS"
 

@@ -9,15 +9,15 @@ from math import asin, cos, radians, sin, sqrt
 import numpy as np
 from scipy.special import ellipk
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.boundary import Gravity, Sliding, moved_onto
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
 from dolfin_tongue.control import Still
 from dolfin_tongue.direct import Model, problem_of
 from dolfin_tongue.geometry.simple import block_body
+from dolfin_tongue.march.state import State
 from dolfin_tongue.rigid import RigidBody
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Sphere
 
 BOWL = Sphere((0.0, 0.0, 0.1), 0.1, inside=True)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import Body
+from dolfin_tongue.anatomy.scenes import REPORT_ATTACHMENTS, TISSUE_VISCOSITY
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.body.body import Body
 from dolfin_tongue.boundary import Attached, Gravity, SurfaceTension
 from dolfin_tongue.constitutive import (
     ActiveMuscles,
@@ -18,9 +19,8 @@ from dolfin_tongue.constitutive import (
 )
 from dolfin_tongue.control import Control, Ramp, SmoothRamp
 from dolfin_tongue.geometry.simple import block_body, surface_nodes
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.scenes import REPORT_ATTACHMENTS, TISSUE_VISCOSITY
-from dolfin_tongue.term import Held
+from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.terms.term import Held
 
 #: The dynamic block of the comparison with FEBio: size, m, and first modulus, Pa.
 FEBIO_SIZE = (0.02, 0.01, 0.01)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import Body
-from dolfin_tongue.errors import BadScene
-from dolfin_tongue.term import Held
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadScene
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.terms.term import Held
 
 
 @dataclass(frozen=True)

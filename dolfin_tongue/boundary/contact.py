@@ -8,14 +8,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.body import Body
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import BadScene, OutOfRange, is_number, listing, require_positive
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.faces import BOUNDARY
 from dolfin_tongue.control.motion import Motion, check_motion
-from dolfin_tongue.errors import BadScene, OutOfRange, is_number, listing, require_positive
-from dolfin_tongue.faces import BOUNDARY
-from dolfin_tongue.kinematics import Expr, Kinematics
 from dolfin_tongue.surfaces.base import Gap, Surface
-from dolfin_tongue.term import Fields, Term
+from dolfin_tongue.terms.kinematics import Expr, Kinematics
+from dolfin_tongue.terms.term import Fields, Term
 
 
 class ContactLaw(ABC):

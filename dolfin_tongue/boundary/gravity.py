@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import ufl
 
-from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.term import EnergyTerm, Fields, require_vector
+from dolfin_tongue.terms.kinematics import Expr, Kinematics
+from dolfin_tongue.terms.term import EnergyTerm, Fields, require_vector
 
 #: Standard gravity, m/s2.
 STANDARD_GRAVITY = 9.81

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import Body
-from dolfin_tongue.errors import BadScene, listing
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadScene, listing
+from dolfin_tongue.body.body import Body
 from dolfin_tongue.surfaces.base import Surface
-from dolfin_tongue.term import Support
+from dolfin_tongue.terms.term import Support
 
 #: Largest distance from the surface at which a reference node counts as on it, m.
 ON_SURFACE = 1e-9

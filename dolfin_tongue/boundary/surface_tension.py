@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dolfin_tongue.errors import require_positive
-from dolfin_tongue.faces import BOUNDARY
-from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.term import Fields, SurfaceTerm
+from dolfin_tongue.base.errors import require_positive
+from dolfin_tongue.body.faces import BOUNDARY
+from dolfin_tongue.terms.kinematics import Expr, Kinematics
+from dolfin_tongue.terms.term import Fields, SurfaceTerm
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import ufl
 
-from dolfin_tongue.body import Body
+from dolfin_tongue.base.errors import BadScene, OutOfRange, require_positive
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.fibres import SPECIFIC_TENSION
 from dolfin_tongue.control import Control
 from dolfin_tongue.control.sources import require_activation
-from dolfin_tongue.errors import BadScene, OutOfRange, require_positive
-from dolfin_tongue.fibres import SPECIFIC_TENSION
-from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.term import Fields, Term
+from dolfin_tongue.terms.kinematics import Expr, Kinematics
+from dolfin_tongue.terms.term import Fields, Term
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import ufl
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.errors import require_not_negative, require_positive
-from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.term import EnergyTerm, Fields
+from dolfin_tongue.base.errors import require_not_negative, require_positive
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.terms.kinematics import Expr, Kinematics
+from dolfin_tongue.terms.term import EnergyTerm, Fields
 
 
 def strain_invariants(strain: Expr) -> tuple[Expr, Expr]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import ufl
 
-from dolfin_tongue.errors import require_positive
-from dolfin_tongue.kinematics import Expr, Kinematics
-from dolfin_tongue.term import Fields, Term
+from dolfin_tongue.base.errors import require_positive
+from dolfin_tongue.terms.kinematics import Expr, Kinematics
+from dolfin_tongue.terms.term import Fields, Term
 
 
 @dataclass(frozen=True)

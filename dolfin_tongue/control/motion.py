@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dolfin_tongue.errors import BadScene, require_finite, require_positive
+from dolfin_tongue.base.errors import BadScene, require_finite, require_positive
 
 
 @runtime_checkable

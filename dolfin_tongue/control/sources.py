@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from dolfin_tongue.errors import BadScene, OutOfRange, is_number
+from dolfin_tongue.base.errors import BadScene, OutOfRange, is_number
 
 
 @runtime_checkable

@@ -37,11 +37,11 @@ Choosing a method
 
 from dolfin_tongue.direct.balance import drift, momentum
 from dolfin_tongue.direct.elements import KINDS
-from dolfin_tongue.direct.implicit import Implicit
 from dolfin_tongue.direct.integrate import Adaptive, Direct, RungeKutta4
 from dolfin_tongue.direct.mesh import Mesh
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.problem import Problem, problem_of
+from dolfin_tongue.direct.tr_bdf2 import Implicit
 
 __all__ = [
     "KINDS",

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.direct.model import Model
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
 
 
 @dataclass(frozen=True)

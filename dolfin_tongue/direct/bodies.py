@@ -21,7 +21,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.rigid import plane
 from dolfin_tongue.rigid.body import RigidBody
 from dolfin_tongue.rigid.loads import Loads

@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.linalg as la
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.direct.model import Model
 
 

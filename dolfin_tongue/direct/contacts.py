@@ -21,10 +21,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.compiled import compiled
 from dolfin_tongue.boundary.contact import Contact, in_front
 from dolfin_tongue.direct.faces import FaceGroup
-from dolfin_tongue.direct.jit import compiled
 from dolfin_tongue.direct.membranes import base_vectors, determinant
 from dolfin_tongue.surfaces.base import Gap
 

@@ -33,7 +33,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 
 #: Corners of the master brick [-1, 1]^3: 0-3 bottom counter-clockwise, 4-7 above them.
 BRICK_CORNERS = np.array(

@@ -11,7 +11,8 @@ from math import sqrt
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.body.faces import row_places
 from dolfin_tongue.direct.elements import (
     BRICK8,
     BRICK20,
@@ -21,7 +22,6 @@ from dolfin_tongue.direct.elements import (
     ElementKind,
 )
 from dolfin_tongue.direct.mesh import Mesh
-from dolfin_tongue.faces import row_places
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import NoDirectForce, UnknownName
+from dolfin_tongue.body.faces import BOUNDARY
+from dolfin_tongue.body.fibres import Fibres, Slots
 from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.boundary.gravity import Gravity
 from dolfin_tongue.boundary.skin import Skin
@@ -27,10 +30,7 @@ from dolfin_tongue.direct.contacts import Obstacle
 from dolfin_tongue.direct.faces import FaceGroup, outer_groups, surface_groups
 from dolfin_tongue.direct.membranes import Film, Membrane, NeoHookean
 from dolfin_tongue.direct.mesh import Block, Mesh
-from dolfin_tongue.errors import NoDirectForce, UnknownName
-from dolfin_tongue.faces import BOUNDARY
-from dolfin_tongue.fibres import Fibres, Slots
-from dolfin_tongue.term import SurfaceTerm, Term
+from dolfin_tongue.terms.term import SurfaceTerm, Term
 
 #: Rate of F, shape (m, q, 3, 3), 1/s; None where no law of the scene needs it.
 Rate = FloatArray | None

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import BadScene
 from dolfin_tongue.direct.model import Model
-from dolfin_tongue.errors import BadScene
 
 #: Energy that contact may make by errors of a method, over the largest energy so far, kinetic and
 #: stored in contacts.

@@ -14,16 +14,16 @@ from typing import Protocol
 import numpy as np
 from scipy.integrate import DOP853, RK45
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import NotConverged, OutOfRange, require_positive
 from dolfin_tongue.direct.impacts import Impacts, Refused
 from dolfin_tongue.direct.limits import Limit, StabilityLimits
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
 from dolfin_tongue.direct.problem import Problem, problem_of
 from dolfin_tongue.direct.trouble import lost
-from dolfin_tongue.errors import NotConverged, OutOfRange, require_positive
-from dolfin_tongue.scene import SAME_TIME, Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import SAME_TIME, Scene
 
 #: Relative volume change of a cell at which an explicit run is given up.
 LOST_VOLUME = 0.05

@@ -20,8 +20,8 @@ and for the change of S by d2W/dE2 = sum_r c_r X_r (x) X_r + c_id (symmetric ide
 
 from __future__ import annotations
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.direct.jit import compiled
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.compiled import compiled
 from dolfin_tongue.direct.tensors import contraction, product, product_transposed
 
 

@@ -21,13 +21,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.boundary.contact import Contact
 from dolfin_tongue.constitutive.active import FibreStress
 from dolfin_tongue.direct.border import condensed
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
-from dolfin_tongue.term import SurfaceTerm, Term
+from dolfin_tongue.terms.term import SurfaceTerm, Term
 
 #: Time, displacement and velocity (all rows).
 State = tuple[float, FloatArray, FloatArray]

@@ -24,11 +24,11 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.compiled import compiled
 from dolfin_tongue.boundary.skin import Skin
 from dolfin_tongue.boundary.surface_tension import SurfaceTension
 from dolfin_tongue.direct.faces import FaceGroup
-from dolfin_tongue.direct.jit import compiled
 
 
 class Membrane(ABC):

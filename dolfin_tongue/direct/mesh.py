@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import Body
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadMesh, UnknownName, listing
+from dolfin_tongue.body.body import Body
 from dolfin_tongue.direct.elements import KINDS, ElementKind
-from dolfin_tongue.errors import BadMesh, UnknownName, listing
 
 
 @dataclass(frozen=True, eq=False)

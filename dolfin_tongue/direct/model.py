@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.direct import points, volume
 from dolfin_tongue.direct.bodies import Bodies
 from dolfin_tongue.direct.contacts import Obstacle
@@ -35,9 +36,8 @@ from dolfin_tongue.direct.membranes import Membrane
 from dolfin_tongue.direct.mesh import Block
 from dolfin_tongue.direct.problem import Problem
 from dolfin_tongue.direct.slides import Slides
-from dolfin_tongue.errors import OutOfRange
-from dolfin_tongue.state import State
-from dolfin_tongue.term import Term
+from dolfin_tongue.march.state import State
+from dolfin_tongue.terms.term import Term
 
 #: Step of the central differences that give velocity and acceleration of moved supports, s.
 SUPPORT_STEP = 1e-4

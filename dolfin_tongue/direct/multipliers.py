@@ -50,11 +50,11 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import BadScene, OutOfRange, require_positive
 from dolfin_tongue.direct import points
 from dolfin_tongue.direct.border import MassBorder, condensed_gradient
 from dolfin_tongue.direct.model import Model
-from dolfin_tongue.errors import BadScene, OutOfRange, require_positive
 
 #: Free nodes up to which Gamma is kept as a dense matrix.
 DENSE_NODES = 450

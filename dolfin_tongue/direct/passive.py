@@ -18,14 +18,14 @@ from math import exp
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.compiled import compiled
 from dolfin_tongue.direct.isochoric import (
     add_identity_moduli,
     add_rank_one,
     add_stress_moduli,
     piola_image,
 )
-from dolfin_tongue.direct.jit import compiled
 from dolfin_tongue.direct.tensors import inverse_transpose, transposed_product
 
 

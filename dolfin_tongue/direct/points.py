@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.direct.jit import compiled
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.compiled import compiled
 
 
 @compiled

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.body.fibres import Fibres
 from dolfin_tongue.boundary.attached import Attached
 from dolfin_tongue.direct.mesh import Mesh, mesh_of
-from dolfin_tongue.fibres import Fibres
 from dolfin_tongue.rigid.body import RigidBody
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces.base import Surface
-from dolfin_tongue.term import Term
+from dolfin_tongue.terms.term import Term
 
 #: Supports that stand still at zero displacement: their motion need not be asked for.
 STANDING = (Attached,)

@@ -24,8 +24,8 @@ from math import exp, sqrt
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.direct.jit import compiled
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.compiled import compiled
 from dolfin_tongue.direct.tensors import inverse_transpose, product_transposed
 
 

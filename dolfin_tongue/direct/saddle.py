@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.direct import points
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import dense_gradient

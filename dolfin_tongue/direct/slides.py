@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.surfaces.base import Surface
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.direct.jit import compiled
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.compiled import compiled
 
 
 @compiled

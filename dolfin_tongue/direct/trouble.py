@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import NotConverged, listing
+from dolfin_tongue.body.shape import VERY_LONG
 from dolfin_tongue.direct.model import Model
-from dolfin_tongue.errors import NotConverged, listing
-from dolfin_tongue.shape import VERY_LONG
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
 
 
 def local_volume_ratios(model: Model, displacement: FloatArray) -> FloatArray:

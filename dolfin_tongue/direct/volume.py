@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.compiled import compiled
 from dolfin_tongue.direct.elements import ElementKind
-from dolfin_tongue.direct.jit import compiled
 
 
 @compiled

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import LARGEST_SIZE, Body
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadScene, require_positive
+from dolfin_tongue.body.body import LARGEST_SIZE, Body
 from dolfin_tongue.control.motion import Motion, check_motion
-from dolfin_tongue.errors import BadScene, require_positive
 from dolfin_tongue.rigid.forces import SKULL, Line, PointForce, RigidForce, Turning
-from dolfin_tongue.term import Support, require_vector
+from dolfin_tongue.terms.term import Support, require_vector
 
 Vector = tuple[float, float, float]
 

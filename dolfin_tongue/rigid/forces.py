@@ -12,18 +12,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.constitutive.active import StressMobilisation
-from dolfin_tongue.control import Control
-from dolfin_tongue.control.sources import require_activation
-from dolfin_tongue.errors import (
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import (
     BadScene,
     OutOfRange,
     require_finite,
     require_not_negative,
     require_positive,
 )
-from dolfin_tongue.term import require_vector
+from dolfin_tongue.constitutive.active import StressMobilisation
+from dolfin_tongue.control import Control
+from dolfin_tongue.control.sources import require_activation
+from dolfin_tongue.terms.term import require_vector
 
 Vector = tuple[float, float, float]
 

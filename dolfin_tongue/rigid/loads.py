@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.rigid import plane
 from dolfin_tongue.rigid.body import RigidBody
 from dolfin_tongue.rigid.forces import SKULL, Line, PointForce, RigidForce, Turning

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 
 
 def turned(arms: FloatArray, angle: float | FloatArray) -> FloatArray:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, real_numbers
-from dolfin_tongue.errors import BadMesh, BadScene
+from dolfin_tongue.base.arrays import FloatArray, real_numbers
+from dolfin_tongue.base.errors import BadMesh, BadScene
 
 
 @dataclass(frozen=True, eq=False)

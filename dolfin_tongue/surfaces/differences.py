@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 
 Function = Callable[[FloatArray], FloatArray]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.arrays import IntArray
-from dolfin_tongue.body import Body
-from dolfin_tongue.errors import BadScene, require_not_negative, require_positive
+from dolfin_tongue.base.arrays import IntArray
+from dolfin_tongue.base.errors import BadScene, require_not_negative, require_positive
+from dolfin_tongue.body.body import Body
 from dolfin_tongue.surfaces.base import Surface, require_surface
 
 

@@ -11,8 +11,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.errors import BadMesh, OutOfRange, is_number, listing
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadMesh, OutOfRange, is_number, listing
 from dolfin_tongue.surfaces.triangulated import Triangulated
 
 #: What VTK reads better than meshio: OBJ files with normals and texture, and VTK's own surfaces.

@@ -21,8 +21,8 @@ from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.algorithms.transformer import strip_variables
 from ufl.corealg.traversal import unique_post_traversal
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.errors import BadScene
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import BadScene
 
 #: NumPy's function for each of UFL's scalar operators.
 OPERATORS: dict[type, Callable[..., Any]] = {

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.errors import OutOfRange, TongueError, require_flags, require_positive
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import OutOfRange, TongueError, require_flags, require_positive
 from dolfin_tongue.surfaces.base import Gap, Surface
 from dolfin_tongue.surfaces.differences import Function, first_derivatives, second_derivatives
 from dolfin_tongue.surfaces.simple import Vector
-from dolfin_tongue.term import require_vector
+from dolfin_tongue.terms.term import require_vector
 
 if TYPE_CHECKING:  # UFL's algorithms are loaded when they are needed
     from dolfin_tongue.surfaces.formula import Formula

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.direct.jit import compiled
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.compiled import compiled
 
 #: Most triangles in a leaf of the tree.
 LEAF = 4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.surfaces.base import Surface, require_places, require_surface
 
 

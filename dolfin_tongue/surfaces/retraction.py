@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dolfin_tongue.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 
 #: Least radius of a dent over its depth: its slope is at most 1.72 / 12 = 0.14.
 FLATNESS = 12.0

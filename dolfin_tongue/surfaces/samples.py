@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.surfaces.nearest import Tree
 from dolfin_tongue.surfaces.triangles import feature_normals
 

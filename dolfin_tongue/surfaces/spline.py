@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.direct.jit import compiled
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.compiled import compiled
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import LARGEST_SIZE
-from dolfin_tongue.errors import BadMesh, listing
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadMesh, listing
+from dolfin_tongue.body.body import LARGEST_SIZE
 
 #: Twice the area of a triangle over the square of its longest edge, below which it has no normal.
 SLIVER = 1e-10

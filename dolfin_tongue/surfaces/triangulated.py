@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray, IntArray, real_numbers, whole_numbers
-from dolfin_tongue.errors import (
+from dolfin_tongue.base.arrays import FloatArray, IntArray, real_numbers, whole_numbers
+from dolfin_tongue.base.errors import (
     OutOfRange,
     is_number,
     require_flags,

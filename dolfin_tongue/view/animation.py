@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.errors import OutOfRange
-from dolfin_tongue.files import replacing
-from dolfin_tongue.state import State
+from dolfin_tongue.base.errors import OutOfRange
+from dolfin_tongue.base.files import replacing
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.march.state import State
 from dolfin_tongue.view.canvas import (
     FAINT,
     INK,

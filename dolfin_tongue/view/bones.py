@@ -13,11 +13,11 @@ from PIL import Image, ImageDraw
 from scipy.ndimage import maximum_filter
 from scipy.spatial import ConvexHull, QhullError
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.body import Body
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.march.state import State
 from dolfin_tongue.rigid import SKULL, LineMuscle, RigidBody, plane
 from dolfin_tongue.rigid.forces import Line
-from dolfin_tongue.state import State
 from dolfin_tongue.view.camera import Camera
 from dolfin_tongue.view.canvas import WHITE
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
-from dolfin_tongue.files import replacing
+from dolfin_tongue.base.files import replacing
 from dolfin_tongue.view.scene3d import Pixels
 
 INK = (40, 40, 48)

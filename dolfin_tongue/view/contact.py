@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dolfin_tongue.arrays import FloatArray
-from dolfin_tongue.body import Body
-from dolfin_tongue.state import State
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.march.state import State
 from dolfin_tongue.view.camera import ABOVE, View
 from dolfin_tongue.view.canvas import milliseconds, save_image, sheet_of
 from dolfin_tongue.view.film import Film

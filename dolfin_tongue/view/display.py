@@ -8,7 +8,7 @@ import shutil
 import subprocess
 from functools import cache
 
-from dolfin_tongue.errors import TongueError
+from dolfin_tongue.base.errors import TongueError
 
 _HINT = "Run it by ./tongue, which starts a virtual display, or by xvfb-run"
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageChops
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.fibres import FloatArray, MuscleFibres
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.fibres import FloatArray, MuscleFibres
 from dolfin_tongue.view.camera import OBLIQUE, Camera
 from dolfin_tongue.view.canvas import Bar, length_bar, save_image, sheet_of, silhouette, spoken
 from dolfin_tongue.view.fields import deformation_gradients

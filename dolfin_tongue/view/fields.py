@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.fibres import FloatArray
-from dolfin_tongue.shape import shape_gradients
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.fibres import FloatArray
+from dolfin_tongue.body.shape import shape_gradients
 
 _CENTRE = np.zeros((1, 3))
 

@@ -8,10 +8,10 @@ from types import TracebackType
 import numpy as np
 from PIL import Image, ImageDraw
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.errors import listing
-from dolfin_tongue.fibres import FloatArray, IntArray
-from dolfin_tongue.state import State
+from dolfin_tongue.base.errors import listing
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.fibres import FloatArray, IntArray
+from dolfin_tongue.march.state import State
 from dolfin_tongue.view.camera import SIDE, Camera, View
 from dolfin_tongue.view.canvas import (
     FAINT,

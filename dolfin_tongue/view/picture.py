@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.errors import UnknownName
-from dolfin_tongue.state import State
+from dolfin_tongue.base.errors import UnknownName
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.march.state import State
 from dolfin_tongue.view.camera import OBLIQUE, Camera, View
 from dolfin_tongue.view.canvas import INK, draw_bars, font, length_bar, save_image, silhouette
 from dolfin_tongue.view.fibres import fibre_segments, muscle_colour, see_through

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dolfin_tongue.files import replacing
+from dolfin_tongue.base.files import replacing
 
 #: Colours that are told apart by most eyes (Okabe and Ito), on white ground.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5230", "#444444")

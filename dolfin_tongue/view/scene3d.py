@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.fibres import FloatArray
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.fibres import FloatArray
 from dolfin_tongue.view.camera import Camera
 from dolfin_tongue.view.display import ensure_display
 from dolfin_tongue.view.surface import Surface

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.state import State
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.march.state import State
 from dolfin_tongue.view.canvas import milliseconds, save_image, sheet_of, spoken
 from dolfin_tongue.view.film import Film
 from dolfin_tongue.view.surroundings import Surroundings

@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
-from dolfin_tongue.body import Body
-from dolfin_tongue.faces import outer_faces
-from dolfin_tongue.fibres import FloatArray, IntArray
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.faces import outer_faces
+from dolfin_tongue.body.fibres import FloatArray, IntArray
 
 #: Faces that meet at a larger angle keep a crease between them, degrees.
 CREASE = 50.0

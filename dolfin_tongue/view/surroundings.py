@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image
 
-from dolfin_tongue.arrays import FloatArray, IntArray
-from dolfin_tongue.body import Body
+from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.body.body import Body
 from dolfin_tongue.boundary.contact import Contact
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
 from dolfin_tongue.surfaces.base import Surface
 from dolfin_tongue.surfaces.triangulated import Triangulated
 from dolfin_tongue.view.bones import INKS, Skeleton
 from dolfin_tongue.view.camera import Camera
 
 if TYPE_CHECKING:
-    from dolfin_tongue.scene import Scene
+    from dolfin_tongue.scene.scene import Scene
     from dolfin_tongue.view.scene3d import Colour
 
 #: Bone under its thin skin, and what the tissue only slides on.

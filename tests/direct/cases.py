@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dolfin_tongue.body import Body
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.fibres import Fibres, MuscleFibres
 from dolfin_tongue.boundary import Gravity, Skin, SurfaceTension
 from dolfin_tongue.constitutive import (
     ActiveMuscles,
@@ -18,9 +19,8 @@ from dolfin_tongue.constitutive import (
 )
 from dolfin_tongue.control import Constant, SmoothRamp
 from dolfin_tongue.direct import KINDS, Mesh, Model, Problem
-from dolfin_tongue.fibres import Fibres, MuscleFibres
 from dolfin_tongue.geometry.simple import block_body, distort
-from dolfin_tongue.term import Held, Term
+from dolfin_tongue.terms.term import Held, Term
 
 CENTIMETRE = 0.01
 MUSCLES = {"along": (1.0, 0.2, 0.0), "across": (0.0, 1.0, 1.0)}

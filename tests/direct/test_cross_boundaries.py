@@ -9,6 +9,7 @@ import pytest
 from cases import apply_matrices, relative
 
 from benchmarks.extremes.proofs import hinged_bone
+from dolfin_tongue.base.errors import BadScene
 from dolfin_tongue.boundary import (
     Barrier,
     Contact,
@@ -21,12 +22,11 @@ from dolfin_tongue.boundary.sliding import off_surface
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
 from dolfin_tongue.control import Constant, SmoothMove, Still, Swing
 from dolfin_tongue.direct import Direct, Implicit, Model, problem_of
-from dolfin_tongue.errors import BadScene
 from dolfin_tongue.geometry.simple import block_body, distort
+from dolfin_tongue.march.compare import orders
+from dolfin_tongue.march.state import State
 from dolfin_tongue.rigid import AngularSpring, LineMuscle, RigidBody
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
-from dolfin_tongue.study import orders
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Cylinder, Plane, Sphere
 from dolfin_tongue.surfaces import Implicit as ImplicitSurface
 
@@ -66,8 +66,8 @@ def random_state(scene: Scene, seed: int) -> State:
 @pytest.mark.parametrize("seed", [0, 1])
 def test_forces_on_bones_and_sliding_nodes_agree(seed):
     """The FEniCSx side is given the displacements that the bones give their nodes."""
-    from dolfin_tongue.coupling import RigidBodies
-    from dolfin_tongue.system import System
+    from dolfin_tongue.fenicsx.couplings import RigidBodies
+    from dolfin_tongue.fenicsx.system import System
 
     scene = carried_block()
     model, system = Model(problem_of(scene)), System(scene, dynamic=True)
@@ -110,7 +110,7 @@ CONTACTS = {
 def test_forces_and_tangents_of_contact_agree(name):
     from petsc4py import PETSc
 
-    from dolfin_tongue.system import System
+    from dolfin_tongue.fenicsx.system import System
 
     body = distort(block_body((0.03, 0.02, 0.02), (3, 2, 2)), 5e-4)
     scene = Scene(body, (CONTACTS[name],))
@@ -143,7 +143,7 @@ def scene_free(scene: Scene) -> np.ndarray:
 @pytest.mark.parametrize("make", [hinged_bone, carried_block])
 def test_motions_converge_to_each_other(make):
     """At order 2: differences of nodes and coordinates fall to a quarter with half the step."""
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     scene, steps, gaps = make(), (2e-3, 1e-3, 5e-4), []
     *_, fine = Direct(scene, Implicit(1e-4, newton=1e-11)).march(0.04)
@@ -158,9 +158,9 @@ def test_motions_converge_to_each_other(make):
 @pytest.mark.parametrize("solver", ["fenicsx", "direct"])
 def test_a_body_may_come_up_behind_the_rim_of_a_sheet(solver, tmp_path):
     """A block falls from above a wall's rim to behind the wall, and goes on as if it were not there."""
-    from dolfin_tongue.pictures import read_table
-    from dolfin_tongue.run import simulate
-    from dolfin_tongue.solve.dynamics import TimeSteps
+    from dolfin_tongue.app.pictures import read_table
+    from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
+    from dolfin_tongue.record.run import simulate
     from dolfin_tongue.surfaces import Triangulated
 
     body = block_body((0.02, 0.02, 0.02), (2, 2, 2))
@@ -186,7 +186,7 @@ def test_a_body_may_come_up_behind_the_rim_of_a_sheet(solver, tmp_path):
 
 def test_the_size_of_g_does_not_matter():
     """The same bowl as a function of another scale and unit, in both solvers; lambda is smaller."""
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     body = moved_onto(block_body((0.02, 0.02, 0.02), (2, 2, 2)), BOWL, "z0")
     centre = np.asarray(BOWL.centre)
@@ -210,7 +210,7 @@ def test_the_size_of_g_does_not_matter():
 @pytest.mark.parametrize("solver", ["fenicsx", "direct"])
 def test_a_steady_push_creeps_through_the_reports_law(solver):
     """(60) has no force at rest: it slows the block and lets it pass, alike in both solvers."""
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     body = block_body((0.02, 0.02, 0.01), (2, 2, 1))
     law = ReportContact(a1=3e6, range=5e-4)

@@ -19,8 +19,8 @@ from dolfin_tongue.boundary import Contact
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.direct import Model, problem_of
 from dolfin_tongue.direct.forces import CONTACTS, LAWS, LOADS, MEMBRANES
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.term import Term
+from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.terms.term import Term
 
 pytest.importorskip("dolfinx")
 TOLERANCE = 1e-12
@@ -31,7 +31,7 @@ class BothSides:
     """One scene in both solvers at one state."""
 
     def __init__(self, term: Term, seed: int):
-        from dolfin_tongue.system import System
+        from dolfin_tongue.fenicsx.system import System
 
         scene = Scene(random_body(seed), (term,))
         self.model = Model(problem_of(scene))

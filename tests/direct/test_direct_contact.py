@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from cases import apply_matrices, mesh_model, mixed_mesh, random_body, relative
 
-from dolfin_tongue.body import Body
+from dolfin_tongue.base.errors import BadScene, NoDirectForce, NotConverged
+from dolfin_tongue.body.body import Body
 from dolfin_tongue.boundary import Attached, Barrier, Contact, Gravity, ReportContact
 from dolfin_tongue.constitutive import MooneyRivlin, ReportTissue, Viscosity
 from dolfin_tongue.control import SmoothMove, Still
 from dolfin_tongue.direct import Adaptive, Direct, Implicit, RungeKutta4, impacts
-from dolfin_tongue.direct.implicit import D
 from dolfin_tongue.direct.limits import StabilityLimits
 from dolfin_tongue.direct.multipliers import Acceleration
-from dolfin_tongue.errors import BadScene, NoDirectForce, NotConverged
+from dolfin_tongue.direct.tr_bdf2 import D
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Plane, Sphere, Surface
-from dolfin_tongue.term import Term
+from dolfin_tongue.terms.term import Term
 
 TIME = 0.1
 MOVED = (Still(1e-4), SmoothMove(4e-4), Still())

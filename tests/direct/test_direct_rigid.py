@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cases import relative
 
+from dolfin_tongue.base.errors import BadScene, NotConverged, OutOfRange
 from dolfin_tongue.boundary import Attached, Gravity, Sliding
 from dolfin_tongue.constitutive import ActiveMuscles, MooneyRivlin, ReportTissue, Viscosity
 from dolfin_tongue.control import Constant, SmoothRamp
@@ -19,17 +20,16 @@ from dolfin_tongue.direct import (
     multipliers,
     saddle,
 )
-from dolfin_tongue.direct.implicit import Motion
 from dolfin_tongue.direct.limits import StabilityLimits
 from dolfin_tongue.direct.multipliers import Acceleration
-from dolfin_tongue.errors import BadScene, NotConverged, OutOfRange
+from dolfin_tongue.direct.tr_bdf2 import Motion
 from dolfin_tongue.geometry.simple import block_body, distort
+from dolfin_tongue.march.state import State
 from dolfin_tongue.rigid import AngularSpring, Moment, RigidBody, Spring, plane
 from dolfin_tongue.rigid.loads import Loads
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Sphere
-from dolfin_tongue.term import Held
+from dolfin_tongue.terms.term import Held
 
 HINGE = {"x": Still(), "z": Still()}
 PIVOT = (-0.03, 0.005, 0.01)

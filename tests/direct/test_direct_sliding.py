@@ -9,6 +9,7 @@ import pytest
 from cases import relative
 from scipy.special import ellipk
 
+from dolfin_tongue.base.errors import BadScene
 from dolfin_tongue.boundary import Attached, Gravity, Sliding
 from dolfin_tongue.boundary.sliding import moved_onto, off_surface
 from dolfin_tongue.constitutive import ActiveMuscles, MooneyRivlin, ReportTissue, Viscosity
@@ -25,10 +26,9 @@ from dolfin_tongue.direct import (
     saddle,
 )
 from dolfin_tongue.direct.multipliers import Acceleration
-from dolfin_tongue.errors import BadScene
 from dolfin_tongue.geometry.simple import block_body, distort
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Cylinder, Plane, Sphere
 
 G = 9.81

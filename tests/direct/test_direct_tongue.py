@@ -11,8 +11,8 @@ from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import SmoothRamp
 from dolfin_tongue.direct import Direct, Implicit
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import Scene
 
 END = 0.4
 
@@ -69,7 +69,7 @@ def test_tongue_moves_within_one_per_cent_at_10_ms(tongue, reference):
 
 def test_both_solvers_move_the_tongue_alike(tongue, reference):
     pytest.importorskip("dolfinx")
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     errors = [
         worst(list(Dynamics(tongue, TimeSteps(dt=dt)).march(END)), reference)

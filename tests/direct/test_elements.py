@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from cases import CENTIMETRE, distorted_element, mesh_model, mixed_mesh, random_state, relative
 
+from dolfin_tongue.base.errors import BadMesh, UnknownName
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.direct.elements import BRICK8, KINDS
 from dolfin_tongue.direct.mesh import Mesh
 from dolfin_tongue.direct.volume import element_gradient, element_hessian, element_volume
-from dolfin_tongue.errors import BadMesh, UnknownName
 
 NAMES = sorted(KINDS)
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from cases import TERMS, apply_matrices, element_model, mesh_model, mixed_mesh, name_of, relative
 
+from dolfin_tongue.base.errors import NoDirectForce, OutOfRange
 from dolfin_tongue.boundary import Gravity
 from dolfin_tongue.constitutive import ReportTissue, Viscosity
 from dolfin_tongue.direct import KINDS, Direct, Model, Problem, RungeKutta4
-from dolfin_tongue.errors import NoDirectForce, OutOfRange
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.term import EnergyTerm, Term
+from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.terms.term import EnergyTerm, Term
 
 NAMES = sorted(KINDS)
 TIME = 0.03

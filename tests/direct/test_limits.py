@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dolfin_tongue.base.errors import NotConverged, OutOfRange
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, MooneyRivlin, ReportTissue, Viscosity
 from dolfin_tongue.control import Ramp
 from dolfin_tongue.direct import Adaptive, Direct, Implicit, RungeKutta4, integrate
 from dolfin_tongue.direct.limits import StabilityLimits
 from dolfin_tongue.direct.multipliers import Acceleration
-from dolfin_tongue.errors import NotConverged, OutOfRange
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene.scene import Scene
 
 
 def block(*terms) -> Scene:

@@ -8,8 +8,8 @@ import pytest
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.direct import Adaptive, Direct, Implicit, RungeKutta4, drift
 from dolfin_tongue.geometry.simple import block_body, distort
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import Scene
 
 
 def thrown(solver: Direct) -> State:

@@ -7,16 +7,16 @@ import pytest
 import scipy.sparse as sp
 from cases import MUSCLES, Shaken, random_state, relative
 
+from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import Constant
 from dolfin_tongue.direct import Model, multipliers, problem_of, saddle
 from dolfin_tongue.direct.limits import assembled
 from dolfin_tongue.direct.multipliers import Acceleration, dense_gradient
-from dolfin_tongue.errors import OutOfRange
 from dolfin_tongue.geometry.simple import block_body, distort
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.term import Support
+from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.terms.term import Support
 
 TAU = 2e-3
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cases import Shaken, distorted_element, mixed_mesh, random_state, relative, uniform_fibres
 
+from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import Ramp, SmoothRamp, Step
@@ -18,11 +19,10 @@ from dolfin_tongue.direct import (
     RungeKutta4,
     integrate,
 )
-from dolfin_tongue.direct.implicit import Motion
-from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.direct.tr_bdf2 import Motion
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.scene import Scene
-from dolfin_tongue.state import State
+from dolfin_tongue.march.state import State
+from dolfin_tongue.scene.scene import Scene
 
 END = 0.03
 

@@ -11,7 +11,7 @@ from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import SmoothRamp
 from dolfin_tongue.direct import Adaptive, Direct, Implicit
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.scene import Scene
+from dolfin_tongue.scene.scene import Scene
 
 pytest.importorskip("dolfinx")
 END = 0.04
@@ -34,7 +34,7 @@ def reference(scene):
 
 
 def test_difference_falls_at_order_2(scene, reference):
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     error = []
     for dt in (1e-3, 5e-4, 2.5e-4):
@@ -52,7 +52,7 @@ def test_difference_falls_at_order_2(scene, reference):
 
 
 def test_pressures_agree_with_the_multipliers(scene, reference):
-    from dolfin_tongue.solve.dynamics import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
 
     *_, state = Dynamics(scene, TimeSteps(dt=2.5e-4)).march(END)
     assert np.abs(reference.pressure).max() > 100.0  # Pa: not the trivial agreement of zeros

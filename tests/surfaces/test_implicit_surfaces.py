@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import ufl
 
-from dolfin_tongue.errors import BadScene, OutOfRange
+from dolfin_tongue.base.errors import BadScene, OutOfRange
 from dolfin_tongue.surfaces import Cylinder, Ellipsoid, Implicit, Plane, Sphere, overlap
 
 CENTRE, AXES = np.array([0.01, -0.02, 0.05]), np.array([0.03, 0.02, 0.012])

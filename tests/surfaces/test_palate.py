@@ -4,7 +4,7 @@ import gmsh
 import numpy as np
 import pytest
 
-from dolfin_tongue.errors import OutOfRange
+from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.geometry.palate import Palate, quarter_ellipse, report_palate
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.surfaces.triangles import area_vectors, edge_table

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from shapes import ball, cube, sheet
 
-from dolfin_tongue.errors import BadMesh, OutOfRange
+from dolfin_tongue.base.errors import BadMesh, OutOfRange
 from dolfin_tongue.surfaces.files import merge_points, read_surface
 from dolfin_tongue.surfaces.triangles import volume
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from shapes import CORNERS, ball, cube, cube_distance, hull, sheet
 
-from dolfin_tongue.errors import BadMesh, OutOfRange
+from dolfin_tongue.base.errors import BadMesh, OutOfRange
 from dolfin_tongue.geometry.published import published_tongue
-from dolfin_tongue.output import fingerprint
+from dolfin_tongue.record.recorder import fingerprint
 from dolfin_tongue.surfaces import Triangulated, overlap, read_surface
 from dolfin_tongue.surfaces.nearest import tree_of
 from dolfin_tongue.surfaces.samples import signed_distance

@@ -1,0 +1,1 @@
+"""Bones and scenes of tongues that demos, tests and benchmarks share."""

@@ -1,0 +1,1 @@
+"""The command line, demos and the pictures of a run."""

@@ -1,0 +1,1 @@
+"""Arrays, errors, units, files, compilation: what every room uses."""

@@ -1,0 +1,1 @@
+"""The body at rest: points, cells, named regions, fibres. Plain arrays, no solver."""

@@ -1,0 +1,1 @@
+"""States of a motion, the diagnosis of a lost one, comparison of two."""

@@ -1,0 +1,1 @@
+"""Runs in time: observed, written to files as they go, resumed."""

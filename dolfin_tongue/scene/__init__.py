@@ -1,0 +1,1 @@
+"""A scene: a body with the terms and supports picked for it."""

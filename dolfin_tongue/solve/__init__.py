@@ -1,1 +1,0 @@
-"""Solvers of the semi-discrete equations: statics and motion in time."""

@@ -1,0 +1,1 @@
+"""What a term and a support are, and the kinematics that terms ask for."""
