@@ -47,6 +47,9 @@ PACKAGE_OF = {
 }
 
 
+WORKERS = ["-n", "auto", "--dist", "worksteal"]
+
+
 def tongue(*arguments, path=None, cwd=TOP, **variables):
     """Run the launcher, with the folder `path` in front of PATH and no other variables than `variables`."""
     variables["PATH"] = f"{path}:{os.environ['PATH']}" if path else os.environ["PATH"]
@@ -182,12 +185,14 @@ def test_results_folder_is_made_where_the_caller_is(play, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["-q"], ["-m", "not slow", "-q"]),
-        (["-m", "slow"], ["-m", "slow"]),
-        (["-mslow", "-k", "a or b"], ["-mslow", "-k", "a or b"]),
+        (["-q"], [*WORKERS, "-m", "not slow", "-q"]),
+        (["-m", "slow"], [*WORKERS, "-m", "slow"]),
+        (["-mslow", "-k", "a or b"], [*WORKERS, "-mslow", "-k", "a or b"]),
+        (["-n0"], ["-m", "not slow", "-n0"]),
+        (["-s"], ["-m", "not slow", "-s"]),
     ],
 )
-def test_slow_tests_only_where_asked_for(play, arguments, expected):
+def test_all_cores_but_slow_tests_only_where_asked_for(play, arguments, expected):
     path = play(python3='for argument; do echo "$argument"; done')
     command = ["-m", "pytest", "-c", f"{TOP}/pyproject.toml", *expected]
     assert direct("test", *arguments, path=path).stdout.splitlines() == command
