@@ -47,7 +47,7 @@ PACKAGE_OF = {
 }
 
 
-WORKERS = ["-n", "auto", "--dist", "worksteal"]
+WORKERS = ["--numprocesses", "auto", "--dist", "worksteal"]
 
 
 def tongue(*arguments, path=None, cwd=TOP, **variables):
@@ -188,7 +188,7 @@ def test_results_folder_is_made_where_the_caller_is(play, tmp_path):
         (["-q"], [*WORKERS, "-m", "not slow", "-q"]),
         (["-m", "slow"], [*WORKERS, "-m", "slow"]),
         (["-mslow", "-k", "a or b"], [*WORKERS, "-mslow", "-k", "a or b"]),
-        (["-n0"], ["-m", "not slow", "-n0"]),
+        (["-n2"], ["-m", "not slow", "-n2"]),
         (["-s"], ["-m", "not slow", "-s"]),
     ],
 )
