@@ -17,25 +17,22 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.plots.accuracy import plot_space, plot_time
 from dolfin_tongue.anatomy.scenes import published_scene, report_tongue
 from dolfin_tongue.app.demo import CHECKOUT, Options
 from dolfin_tongue.base.errors import TongueError
 from dolfin_tongue.base.files import replacing, write_json, write_text
-from dolfin_tongue.body.shape import volume_ratios
+from dolfin_tongue.body.shape import volume_changes, volume_ratios
 from dolfin_tongue.boundary import Attached
 from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import Constant, SmoothRamp
-from dolfin_tongue.direct.integrate import Adaptive, Direct, RungeKutta4
-from dolfin_tongue.direct.tr_bdf2 import Implicit
-from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
-from dolfin_tongue.fenicsx.newton import Tolerances
-from dolfin_tongue.fenicsx.statics import Statics
-from dolfin_tongue.fenicsx.system import System
+from dolfin_tongue.direct import Adaptive, RungeKutta4, TrBdf2
+from dolfin_tongue.fenicsx import GeneralisedAlpha, Statics, Tolerances
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
 from dolfin_tongue.geometry.simple import block_body
 from dolfin_tongue.march.compare import at_times, interpolated, landmark_path, peak_memory, timed
-from dolfin_tongue.record.observe import EnergyAudit, local_volume_ratios, volume_changes
+from dolfin_tongue.record.observe import EnergyAudit
 from dolfin_tongue.scene.scene import Scene
 
 REPEATS = 3
@@ -91,25 +88,25 @@ def scene_of(name, data):
 
 def alpha(radius, **newton):
     """Generalised-alpha with a spectral radius, lagged Newton unless told otherwise."""
-    return lambda scene, dt: Dynamics(
-        scene, TimeSteps(dt, spectral_radius=radius, newton=Tolerances(**newton))
-    )
+    tolerances = Tolerances(**newton)
+    return lambda dt: GeneralisedAlpha(dt, spectral_radius=radius, newton=tolerances)
 
 
+#: Label -> the method for a step (s).
 METHODS = {
     "alpha2 radius 1": alpha(1.0),
     "alpha2 radius 0.8": alpha(0.8),
     "alpha2 radius 0.5": alpha(0.5),
     "alpha2 radius 0.8, full Newton": alpha(0.8, renew_above=0.0),
-    "backward Euler": lambda scene, dt: Dynamics(scene, TimeSteps(dt, method="backward_euler")),
-    "direct implicit": lambda scene, dt: Direct(scene, Implicit(dt)),
-    "direct implicit, loose Newton": lambda scene, dt: Direct(scene, Implicit(dt, newton=1e-5)),
-    "direct linearly implicit": lambda scene, dt: Direct(scene, Implicit(dt, corrections=1)),
+    "backward Euler": lambda dt: GeneralisedAlpha(dt, method="backward_euler"),
+    "direct implicit": TrBdf2,
+    "direct implicit, loose Newton": lambda dt: TrBdf2(dt, newton=1e-5),
+    "direct linearly implicit": lambda dt: TrBdf2(dt, corrections=1),
 }
 #: Explicit methods run at their stability limit whatever dt: once per scene, where cells are large.
 EXPLICIT = {
-    "direct Runge-Kutta 4": lambda scene, dt: Direct(scene, RungeKutta4(dt, cut=True)),
-    "direct adaptive": lambda scene, dt: Direct(scene, Adaptive(1e-6, rtol=1e-4, pair="RK45")),
+    "direct Runge-Kutta 4": lambda dt: RungeKutta4(dt, cut=True),
+    "direct adaptive": lambda dt: Adaptive(1e-6, rtol=1e-4, pair="RK45"),
 }
 EXPLICIT_SCENES = ("block, one muscle", "report's tongue")
 EXPLICIT_END = 0.1
@@ -124,25 +121,23 @@ def measure(name, method, data, reference):
     explicit = method in EXPLICIT
     make = (EXPLICIT if explicit else METHODS)[method]
     end = min(SCENES[name][0], EXPLICIT_END) if explicit else SCENES[name][0]
-    audit_system = System(scene, dynamic=True)
     rows = []
     for dt in [STEPS[-1]] if explicit else STEPS:
         row = {"scene": name, "method": method, "dt_s": dt}
         try:
-            rows.append(
-                row | one_step_size(scene, make, dt, end, audit_system, reference, explicit)
-            )
+            rows.append(row | one_step_size(scene, make(dt), end, reference, explicit))
         except TongueError as error:
             rows.append(row | {"outcome": str(error)})
     return rows
 
 
-def one_step_size(scene, make, dt, end, audit_system, reference, explicit):
+def one_step_size(scene, method, end, reference, explicit):
     """Measure set-up, marching and errors at one dt."""
     begin = clock.perf_counter()
-    next(iter(make(scene, dt).march(end)))
+    solver = method.solver(scene)
+    next(iter(solver.march(end)))
     set_up = clock.perf_counter() - begin
-    timing, states = timed(lambda: make(scene, dt), end, 1 if explicit else REPEATS)
+    timing, states = timed(lambda: method.solver(scene), end, 1 if explicit else REPEATS)
     times = [SAMPLE * (k + 1) for k in range(round(end / SAMPLE))]
     exact = interpolated(states, times)
     nodes = [scene.body.landmark("tip"), scene.body.landmark(second_landmark(scene))]
@@ -163,25 +158,20 @@ def one_step_size(scene, make, dt, end, audit_system, reference, explicit):
             float(np.abs(volume_changes(scene.body, s.displacement)).max()) for s in states
         ),
         "local_volume_error": max(
-            float(np.abs(volume_ratios(body.points, s.displacement, body.cells) - 1).max())
+            float(np.abs(part - 1).max())
             for s in states
+            for part in volume_ratios(body, s.displacement)
         ),
-        "energy_error": balance_error(audit_system, states),
+        "energy_error": balance_error(solver, states),
         "peak_memory_MB": peak_memory() / 1e6,
     }
 
 
-def balance_error(system, states):
+def balance_error(solver, states):
     """Largest error of the energy balance over the energy exchanged."""
-    audit = EnergyAudit(system)
-    records = [
-        audit.update(replace(s, step=dt)) for s, dt in zip(states, _steps(states), strict=True)
-    ]
+    audit = EnergyAudit(solver, solver.scene)
+    records = [audit.update(state) for state in states]
     return max(abs(r["balance_J"]) for r in records) / records[-1]["exchanged_J"]
-
-
-def _steps(states):
-    return [0.0, *np.diff([s.time for s in states])]
 
 
 def second_landmark(scene):
@@ -196,7 +186,7 @@ def reference_path(name, data):
     nodes = [scene.body.landmark("tip"), scene.body.landmark(second_landmark(scene))]
     coarse, fine = (
         landmark_path(
-            at_times(Dynamics(scene, TimeSteps(h, newton=TIGHT)).march(end), times), nodes
+            at_times(GeneralisedAlpha(h, newton=TIGHT).solver(scene).march(end), times), nodes
         )
         for h in (2 * dt, dt)
     )
@@ -234,10 +224,10 @@ def _space(name, scenes, finest, limit):
                 yield row | {"outcome": str(error)}
                 continue
             body = scene.body
-            ratios = local_volume_ratios(solver.system, state)
+            ratios = solver.strain(state).volume_ratio
             solutions[mesh, pair] = row | {
                 "outcome": "finished",
-                "unknowns": solver.system.space.size,
+                "unknowns": solver.system.size,
                 "wall_s": clock.perf_counter() - begin,
                 "tip": state.displacement[body.landmark("tip")],
                 "local_volume_error": float(np.abs(ratios - 1).max()),
@@ -266,13 +256,14 @@ def main(options: Options) -> dict[str, object]:
             rows += _in_own_process(name, method, options.data, path)
             _write(options.folder / "accuracy_time", rows)
             _tell(rows[-1])
-        _plot(options.folder / f"accuracy_{names.index(name) + 1}.png", name, rows)
+        picture = options.folder / f"accuracy_{names.index(name) + 1}.png"
+        plot_time(picture, name, rows, [*METHODS, *EXPLICIT])
     space = []
     for row in spatial_rows():
         space.append(row)
         _write(options.folder / "accuracy_space", space)
         print({k: row[k] for k in row if k not in ("tip", "scene")}, flush=True)
-    _plot_space(options.folder / "accuracy_space.png", space)
+    plot_space(options.folder / "accuracy_space.png", space)
     return digest(rows)
 
 
@@ -315,10 +306,9 @@ def _digest_row(row):
 
 
 def _in_own_process(name, method, data, reference):
-    arguments = json.dumps([name, method, data and str(data), str(reference)])
-    done = subprocess.run(
-        [sys.executable, __file__, arguments], capture_output=True, text=True, cwd=CHECKOUT
-    )
+    paths = [path and str(path.resolve()) for path in (data, reference)]
+    command = [sys.executable, "-m", "benchmarks.accuracy", json.dumps([name, method, *paths])]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=CHECKOUT)
     if done.returncode:
         return [{"scene": name, "method": method, "outcome": done.stderr.strip().splitlines()[-1]}]
     return json.loads(done.stdout.splitlines()[-1])
@@ -337,62 +327,6 @@ def _write(path, rows):
         lines.append(",".join(json.dumps(row[c]) if c in row else "" for c in columns))
     write_text(path.with_suffix(".csv"), "\n".join(lines) + "\n")
     write_json(path.with_suffix(".json"), rows)
-
-
-def _plot(path, name, rows):
-    """Draw tip error against wall seconds per simulated second, one line per method."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8, 5), layout="constrained")
-    axes = figure.subplots()
-    for method in [*METHODS, *EXPLICIT]:
-        found = [r for r in rows if (r["scene"], r["method"]) == (name, method) and "wall_s" in r]
-        if not found:
-            continue
-        end = [r["wall_s"] * r["simulated_per_wall"] for r in found]
-        wall = np.array(
-            [[r[k] for k in ("wall_s", "wall_least_s", "wall_largest_s")] for r in found]
-        )
-        wall /= np.array(end)[:, None]
-        spread = [wall[:, 0] - wall[:, 1], wall[:, 2] - wall[:, 0]]
-        axes.errorbar(
-            wall[:, 0], [r["tip_error"] for r in found], xerr=spread, marker="o", ms=4, label=method
-        )
-    axes.axvline(1.0, color="0.6", lw=1)
-    axes.text(1.0, axes.get_ylim()[1], " real time", va="top", color="0.4", fontsize=8)
-    axes.axhline(0.01, color="0.6", lw=1, ls=":")
-    axes.set(
-        xscale="log", yscale="log", title=f"{name}: error in time against run time",
-        xlabel="wall seconds per simulated second", ylabel="largest error of the tip, relative",
-    )  # fmt: skip
-    axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize=8)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=130)
-
-
-def _plot_space(path, rows):
-    """Draw tip error against wall time of a static solve, one line per pair."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 4.5), layout="constrained")
-    names = list(dict.fromkeys(row["scene"] for row in rows))
-    for axes, name in zip(figure.subplots(1, len(names)), names, strict=True):
-        for pair in ("Q1/P0", "Q2/P1", "P2/P1"):
-            found = [r for r in rows if (r["scene"], r["pair"]) == (name, pair) and "unknowns" in r]
-            found = [r for r in found if r["tip_error"] > 0]
-            axes.loglog(
-                [r["wall_s"] for r in found], [r["tip_error"] for r in found], "o-", label=pair
-            )
-            for r in found:
-                axes.annotate(r["mesh"], (r["wall_s"], r["tip_error"]), fontsize=7)
-        axes.set(
-            title=name, xlabel="wall time of the static solve, s", ylabel="tip error, relative"
-        )
-        axes.grid(alpha=0.3, which="both")
-        axes.legend(fontsize=8)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=130)
 
 
 if __name__ == "__main__":

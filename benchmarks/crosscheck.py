@@ -12,15 +12,13 @@ from dataclasses import astuple
 from dolfin_tongue.anatomy.scenes import published_scene, report_tongue
 from dolfin_tongue.app.demo import Options
 from dolfin_tongue.base.files import replacing, write_json, write_text
+from dolfin_tongue.body.state import State
 from dolfin_tongue.control import Ramp, SmoothRamp
-from dolfin_tongue.direct.integrate import Adaptive, Direct
-from dolfin_tongue.direct.tr_bdf2 import Implicit
-from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
-from dolfin_tongue.fenicsx.newton import Tolerances
+from dolfin_tongue.direct import Adaptive, TrBdf2
+from dolfin_tongue.fenicsx import GeneralisedAlpha, Tolerances
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
 from dolfin_tongue.march.compare import at_times, difference, orders, visiting
-from dolfin_tongue.march.state import State
 
 TIGHT = Tolerances(1e-12, 1e-12)
 REPORT_STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
@@ -45,7 +43,7 @@ def fenicsx_differences(scene, end, steps, reference):
     """Differences of the FEniCSx solver from the reference, one per dt."""
     rows = []
     for dt in steps:
-        states = Dynamics(scene, TimeSteps(dt, newton=TIGHT)).march(end)
+        states = GeneralisedAlpha(dt, newton=TIGHT).solver(scene).march(end)
         rows.append(difference(at_times(states, samples(end)), reference))
     return rows
 
@@ -53,7 +51,7 @@ def fenicsx_differences(scene, end, steps, reference):
 def extrapolated(scene, end, dt):
     """Motion of the direct implicit method at dt and dt/2, extrapolated to order 3 or 4."""
     coarse, fine = (
-        at_times(Direct(scene, Implicit(h, newton=1e-9)).march(end), samples(end))
+        at_times(TrBdf2(h, newton=1e-9).solver(scene).march(end), samples(end))
         for h in (dt, dt / 2)
     )
 
@@ -82,7 +80,7 @@ def main(options: Options) -> dict[str, object]:
         if published:
             reference, steps = extrapolated(scene, end, 5e-4), PUBLISHED_STEPS
         else:
-            solver = Direct(scene, Adaptive(tolerance=1e-10, rtol=1e-9))
+            solver = Adaptive(tolerance=1e-10, rtol=1e-9).solver(scene)
             reference, steps = visiting(solver, samples(end)), REPORT_STEPS
         rows = fenicsx_differences(scene, end, steps, reference)
         table += table_of(name, steps, rows)

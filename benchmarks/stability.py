@@ -6,131 +6,23 @@ the end. What needs other programs' files or a published tongue is skipped witho
 DOLFIN_TONGUE_PEERS, option --data). Cheap scenes come first; the files grow while it runs.
 """
 
-import csv
-import io
-import time as clock
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.extremes import charts, contacts, peers, scenes
-from benchmarks.extremes.outcome import Outcome, attempt_alpha2, attempt_march, read_table
+from benchmarks.extremes import charts, contacts, peers, scenes, stiffness
+from benchmarks.extremes.outcome import attempt_march, read_table
+from benchmarks.extremes.report import DIRECT, FENICSX, Report, both, markdown, solver_of
 from dolfin_tongue.anatomy.scenes import published_scene
 from dolfin_tongue.app.demo import Options
-from dolfin_tongue.base.arrays import FloatArray
-from dolfin_tongue.base.files import write_json, write_text
+from dolfin_tongue.base.files import write_text
+from dolfin_tongue.body.state import State
 from dolfin_tongue.control import Ramp, Step
-from dolfin_tongue.direct import Adaptive, Implicit, RungeKutta4
-from dolfin_tongue.direct.integrate import Method
-from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
-from dolfin_tongue.fenicsx.newton import Tolerances
-from dolfin_tongue.fenicsx.statics import Statics
+from dolfin_tongue.direct import Adaptive, RungeKutta4, TrBdf2
+from dolfin_tongue.fenicsx import GeneralisedAlpha, Statics, Tolerances
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
-from dolfin_tongue.march.state import State
 from dolfin_tongue.scene.scene import Scene
-
-FENICSX, DIRECT = "FEniCSx", "direct"
-AnyMethod = Method | TimeSteps
-
-#: Methods of the map: label, and the method for a step (s).
-MAP_METHODS: dict[str, Callable[[float], AnyMethod]] = {
-    "alpha2, radius 0": lambda dt: TimeSteps(dt, spectral_radius=0.0),
-    "alpha2, radius 0.8": lambda dt: TimeSteps(dt),
-    "alpha2, radius 1": lambda dt: TimeSteps(dt, spectral_radius=1.0),
-    "RungeKutta4": lambda dt: RungeKutta4(dt),
-    "Adaptive (largest dt)": lambda dt: Adaptive(largest=dt),
-    "Implicit": lambda dt: Implicit(dt),
-}
-MAP_END = 0.06
-#: Accepted steps after which a run of the map is given up; the smallest dt takes 600.
-MAP_MOST = 2000
-
-
-def both(dt: float = 5e-3, tolerance: float | None = None) -> tuple[TimeSteps, Implicit]:
-    """Return the method of each solver that is meant for production."""
-    return TimeSteps(dt, tolerance=tolerance), Implicit(dt, tolerance=tolerance)
-
-
-@dataclass
-class Report:
-    """Collects runs, prints them and keeps the files up to date.
-
-    Parameters
-    ----------
-    folder : for ``extremes.csv``, ``extremes.json`` and the folders of the runs.
-    rows : one per run.
-    """
-
-    folder: Path
-    rows: list[dict] = field(default_factory=list)
-    begin: float = field(default_factory=clock.perf_counter)
-
-    def runs(
-        self, name: str, scene: Scene, end: float, methods: Sequence[AnyMethod] | None = None
-    ) -> None:
-        """Attempt a scene with several methods, each in a folder of its own."""
-        for method in both() if methods is None else methods:
-            self.add(name, method, self.attempt(name, scene, end, method))
-
-    def attempt(self, name: str, scene: Scene, end: float, method: AnyMethod) -> Outcome:
-        """Attempt one run, without a row; FEniCSx by `run.simulate`."""
-        if isinstance(method, TimeSteps):
-            return attempt_alpha2(scene, end, self.run_folder(name, method), method)
-        return attempt_march(scene, end, method, self.run_folder(name, method))[0]
-
-    def run_folder(self, name: str, method: AnyMethod) -> Path:
-        """Folder of a run."""
-        words = "".join(c if c.isalnum() or c == "." else " " for c in name).split()
-        return self.folder / "_".join(words) / solver_of(method)
-
-    def add(self, name: str, method: AnyMethod, outcome: Outcome, note: str = "") -> None:
-        """Take up the outcome of a run."""
-        numbers = {
-            "time_s": outcome.time, "steps": outcome.steps, "max_volume_change": outcome.volume,
-            "wall_s": outcome.wall,
-        }  # fmt: skip
-        self.row(name, solver_of(method), outcome.short, note, outcome.kind, numbers, outcome.cause)
-
-    def row(
-        self, name: str, solver: str, text: str, note: str = "", kind: str = "solved",
-        numbers: dict[str, float] | None = None, cause: str = "",
-    ) -> None:  # fmt: skip
-        """Add a row, print it, and write the files anew."""
-        blank = dict.fromkeys(("time_s", "steps", "max_volume_change", "wall_s"))
-        row = {"scene": name, "solver": solver, "outcome": text, "note": note, "kind": kind}
-        self.rows.append(row | (numbers or blank) | {"cause": cause})
-        elapsed = clock.perf_counter() - self.begin
-        print(f"{elapsed:5.0f} s  {name} | {solver}: {text}; {note}".rstrip("; "), flush=True)
-        write_csv(self.folder / "extremes.csv", self.rows)
-        write_json(self.folder / "extremes.json", self.rows)
-
-    def table(self) -> dict[str, dict[str, str]]:
-        """One row per scene, one column per solver."""
-        table: dict[str, dict[str, str]] = {}
-        for row in self.rows:
-            cells = table.setdefault(row["scene"], {FENICSX: "", DIRECT: "", "note": ""})
-            cells[row["solver"]] = row["outcome"]
-            if row["note"] not in cells["note"]:
-                cells["note"] = f"{cells['note']}; {row['note']}".strip("; ")
-        return table
-
-
-def solver_of(method: AnyMethod) -> str:
-    """Which solver a method belongs to."""
-    return FENICSX if isinstance(method, TimeSteps) else DIRECT
-
-
-def write_csv(path: Path, rows: list[dict]) -> None:
-    """Write rows with the keys of the first as columns."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_text(path, text.getvalue())
-
 
 # -- extreme scenes --------------------------------------------------------------------------------
 
@@ -174,10 +66,8 @@ def boundaries(report: Report) -> None:
     """Impact, squeezing, light and heavy bones, films on bad cells, sliding."""
     for speed, tilt, name in ((0.1, 0, "face"), (1.0, 0, "face"), (1.0, 30, "corner")):
         scene, start = contacts.dropped_block(speed, tilt)
-        for method in both(2.5e-3):
-            label = f"block dropped on a {name} at {speed:g} m/s"
-            outcome, _ = attempt_march(scene, 0.1, method, report.run_folder(label, method), start)
-            report.add(label, method, outcome)
+        label = f"block dropped on a {name} at {speed:g} m/s"
+        report.runs(label, scene, 0.1, both(2.5e-3), start)
     for distance, duration, note in (
         (0.006, 0.1, ""), (0.006, 0.02, ""), (0.01, 0.1, ", on a node that is held")
     ):  # fmt: skip
@@ -207,20 +97,17 @@ def rests(report: Report) -> None:
         ("10 s of rest under gravity", hanging, start),
         ("10 s of sagging to rest", hanging, None),
     ):
+        tip = body.points[body.landmark("tip")]
+        if scene is hanging:
+            tip = tip + rest.displacement[body.landmark("tip")]
         for method in both():
-            folder = report.run_folder(name, method)
-            outcome, states = attempt_march(scene, 10.0, method, folder, begin)
-            tip = rest.displacement[body.landmark("tip")] if scene is hanging else 0.0
-            late = outcome.times >= (0.0 if begin or scene is not hanging else 5.0)
-            drift = np.linalg.norm(end_path(scene, states, "tip")[late] - tip, axis=1)
+            outcome = report.attempt(name, scene, 10.0, method, begin)
+            path = read_table(report.run_folder(name, method) / "trajectories.csv")
+            late = path["time_s"] >= (0.0 if begin or scene is not hanging else 5.0)
+            places = np.column_stack([path[f"tip_{axis}_m"] for axis in "xyz"])[late]
+            drift = np.linalg.norm(places - tip, axis=1)
             note = f"{solver_of(method)}: tip within {drift.max(initial=0.0):.0e} m of equilibrium"
             report.add(name, method, outcome, note + (" after 5 s" if not late.all() else ""))
-
-
-def end_path(scene: Scene, states: Sequence[State], landmark: str) -> FloatArray:
-    """Displacement of a landmark over a motion, shape (states, 3), m."""
-    node = scene.body.landmark(landmark)
-    return np.array([state.displacement[node] for state in states]).reshape(-1, 3)
 
 
 # -- against FEBio ---------------------------------------------------------------------------------
@@ -230,9 +117,9 @@ def swings(report: Report) -> None:
     """Swing FEBio's undamped block for 10 s at 5 ms, and see whether its energy grows."""
     scene = scenes.febio_dynamic((8, 4, 4), active=False)
     scale = 0.0
-    methods = [TimeSteps(5e-3, spectral_radius=radius) for radius in (1.0, 0.9, 0.8)]
-    for method in (*methods, Implicit(5e-3)):
-        kind = f"radius {method.spectral_radius}" if isinstance(method, TimeSteps) else "TR-BDF2"
+    radii = (1.0, 0.9, 0.8)
+    methods = {f"radius {r}": GeneralisedAlpha(5e-3, spectral_radius=r) for r in radii}
+    for kind, method in (methods | {"TR-BDF2": TrBdf2(5e-3)}).items():
         name = f"undamped block for 10 s, {kind}"
         outcome = report.attempt(name, scene, 10.0, method)
         if not scale:
@@ -244,7 +131,7 @@ def swings(report: Report) -> None:
 
 
 def contractions(report: Report) -> None:
-    """FEBio's block under 20 kPa along z ramped over 50 ms, at steps of which FEBio dies."""
+    """Contract FEBio's block by 20 kPa along z over 50 ms, at steps of which FEBio dies."""
     for (cells, ms), died in peers.DEATHS.items():
         name = f"20 kPa across, {'x'.join(map(str, cells))}, dt {ms} ms"
         scene = scenes.febio_dynamic(cells, active=True)
@@ -293,7 +180,7 @@ def febio_curves(report: Report) -> None:
         scene = scenes.febio_dynamic(cells, active=load == "act20k")
         times, expected = peers.end_face(folder, cells, load)
         face = scene.body.nodes("x1")
-        for method in (TimeSteps(2.5e-4, spectral_radius=1.0), Implicit(2.5e-4)):
+        for method in (GeneralisedAlpha(2.5e-4, spectral_radius=1.0), TrBdf2(2.5e-4)):
             outcome, states = attempt_march(scene, 0.1, method)
             ours = np.array([s.displacement[face, 0].mean() for s in states])
             gap = np.abs(ours - np.interp(outcome.times, times, expected))
@@ -323,66 +210,6 @@ def published(report: Report, data: Path | None) -> None:
             report.add(name, method, report.attempt(name, scene, 0.2, method), note)
 
 
-# -- the map ---------------------------------------------------------------------------------------
-
-
-def stiffness_map(folder: Path) -> list[charts.Point]:
-    """Run the block at every dt, stiffness and viscosity with every method."""
-    points: list[charts.Point] = []
-    for axis, values in charts.AXES.items():
-        for value in values:
-            scene = scenes.muscle_block(**{axis: value})
-            _, states = attempt_march(scene, MAP_END, Implicit(5e-5, newton=1e-9))
-            fine = np.array([s.time for s in states]), end_path(scene, states, "end")
-            part = [
-                _map_point(scene, fine, method, axis, value, dt)
-                for method in MAP_METHODS
-                for dt in charts.MAP_STEPS
-            ]
-            points += part
-            write_csv(folder / "map.csv", [asdict(point) for point in points])
-            print(f"       map, {axis} {value:g}: {charts.counted(part)}", flush=True)
-    charts.draw_map(points, list(MAP_METHODS), folder / "stability.png")
-    return points
-
-
-def _map_point(
-    scene: Scene, fine: tuple[FloatArray, FloatArray], method: str, axis: str, value: float,
-    dt: float,
-) -> charts.Point:  # fmt: skip
-    """One run of the map, compared with the path at a small step."""
-    outcome, states = attempt_march(scene, MAP_END, MAP_METHODS[method](dt), most=MAP_MOST)
-    path = end_path(scene, states, "end")
-    error = charts.path_error(outcome.times, path, fine) if states else np.nan
-    return charts.Point(
-        method, axis, value, dt, outcome.kind, outcome.cause, error, outcome.steps, outcome.wall,
-        outcome.volume,
-    )  # fmt: skip
-
-
-def map_rows(points: list[charts.Point]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Per method and axis: how many runs ended how, and how many paths are right."""
-    for method in MAP_METHODS:
-        for axis in charts.AXES:
-            part = [p for p in points if (p.method, p.axis) == (method, axis)]
-            alive = [p for p in part if p.kind in ("finished", "drifted")]
-            good = sum(p.error <= charts.POOR for p in alive)
-            note = f"{good} of {len(part)} right to {100 * charts.POOR:.0f} %"
-            worst = max((p.error for p in alive), default=np.nan)
-            note += f"; the worst that finished is off by {100 * worst:.0f} %"
-            solver = FENICSX if method.startswith("alpha2") else DIRECT
-            cells = {FENICSX: "", DIRECT: "", "note": note} | {solver: charts.counted(part)}
-            yield f"map, {axis}: {method}", cells
-
-
-def markdown(table: dict[str, dict[str, str]]) -> str:
-    """Return the table for the documentation."""
-    columns = list(next(iter(table.values())))
-    lines = ["| scene | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
-    lines += [f"| {name} | " + " | ".join(row.values()) + " |" for name, row in table.items()]
-    return "\n".join(lines) + "\n"
-
-
 def verdict(rows: list[dict], points: list[charts.Point]) -> str:
     """Count what must not be."""
     kinds = [row["kind"] for row in rows], [point.kind for point in points]
@@ -410,8 +237,8 @@ def main(options: Options) -> dict[str, object]:
     ):
         part(report)
     published(report, options.data)
-    points = stiffness_map(options.folder)
-    table = report.table() | dict(map_rows(points))
+    points = stiffness.stiffness_map(options.folder)
+    table = report.table() | dict(stiffness.map_rows(points))
     table["faults"] = {FENICSX: "", DIRECT: "", "note": verdict(report.rows, points)}
     write_text(options.folder / "table.md", markdown(table))
     return dict(table)

@@ -10,16 +10,15 @@ from dataclasses import replace
 import numpy as np
 
 from dolfin_tongue import view
-from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.demo import Options, play
 from dolfin_tongue.app.pictures import SHEET_FRAMES, read_table
 from dolfin_tongue.body.body import Body
 from dolfin_tongue.body.faces import areas
 from dolfin_tongue.boundary import SurfaceTension
 from dolfin_tongue.constitutive import Viscosity
-from dolfin_tongue.direct import Implicit, Model, drift, problem_of
-from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
+from dolfin_tongue.direct import Model, TrBdf2, drift
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.record.run import Run, simulate
+from dolfin_tongue.record.run import Method, Run
 from dolfin_tongue.scene.scene import Scene
 
 EDGE = 0.02  # m
@@ -37,21 +36,18 @@ def cube(refinement: int = 1) -> Body:
 def main(options: Options) -> dict[str, object]:
     """Run the demo; returns the numbers worth printing."""
     scene = Scene(cube(options.refinement), (Viscosity(ETA), SurfaceTension(SIGMA)))
-    print(f"a cube of {len(scene.body.cells)} elements under surface tension, free in space")
-    with progress_bar("simulated", END) as progress:
-        run = simulate(
-            scene, END, options.folder, time_steps(options),
-            frame_interval=0.01, resume=options.resume, progress=progress,
-        )  # fmt: skip
-    if options.pictures:
-        draw(run)
+    print(f"a cube of {scene.body.cell_count} elements under surface tension, free in space")
+    run = play(
+        scene, END, options, 5e-3, "a cube becomes a drop",
+        method=method_of(options), frame_interval=0.01, draw=draw,
+    )  # fmt: skip
     return numbers(run)
 
 
-def time_steps(options: Options) -> TimeSteps | Implicit:
+def method_of(options: Options) -> Method:
     """Choose steps; the direct solver's default tolerance, made for tissue, is noise of 0.1 Pa."""
-    steps = options.steps(5e-3)
-    return replace(steps, newton=1e-10) if isinstance(steps, Implicit) else steps
+    method = options.method(5e-3)
+    return replace(method, newton=1e-10) if isinstance(method, TrBdf2) else method
 
 
 def numbers(run: Run) -> dict[str, object]:
@@ -64,7 +60,7 @@ def numbers(run: Run) -> dict[str, object]:
     distance = np.linalg.norm(outer - outer.mean(axis=0), axis=1)
     area = areas(place, body.boundary).sum()
     pressure = (last.pressure * body.volumes).sum() / volume
-    kept = drift(Model(problem_of(run.scene)), run.frames)
+    kept = drift(Model(run.scene), run.frames)
     return {
         "mean pressure / (2 sigma / R)": pressure / (2 * SIGMA / radius),
         "area / area of the sphere, at the start": 6 * EDGE**2 / (4 * np.pi * radius**2),
@@ -81,11 +77,11 @@ def numbers(run: Run) -> dict[str, object]:
     }
 
 
-def draw(run: Run) -> None:
+def draw(run: Run, title: str) -> None:
     """Draw a sheet of frames, a film, the last shape and the energies."""
     body, folder = run.scene.body, run.folder
-    frames = view.telling_frames(run.frames, SHEET_FRAMES)
-    view.contact_sheet(body, frames, folder / "sheet.png", title="a cube becomes a drop")
+    frames = view.key_frames(run.frames, SHEET_FRAMES)
+    view.contact_sheet(body, frames, folder / "sheet.png", title=title)
     view.animation(body, run.frames, folder / "animation.gif")
     view.shape_picture(body, run.last, folder / "shape.png")
     view.energy_plot(read_table(folder / "steps.csv"), folder / "energy.png")

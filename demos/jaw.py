@@ -8,9 +8,7 @@ from math import degrees
 
 from dolfin_tongue.anatomy.bones import opening
 from dolfin_tongue.anatomy.scenes import report_mouth
-from dolfin_tongue.app.demo import Options, progress_bar
-from dolfin_tongue.app.pictures import picture_run
-from dolfin_tongue.record.run import simulate
+from dolfin_tongue.app.demo import Options, play
 
 END = 0.6
 OPENS_AT = 0.2
@@ -21,14 +19,8 @@ def main(options: Options) -> dict[str, object]:
     scene = report_mouth(
         {}, ("mandible", "hyoid"), options.refinement, motion=opening(OPENS_AT, 0.2)
     )
-    print(f"tongue of {len(scene.body.cells)} elements on a mandible and a hyoid")
-    with progress_bar("simulated", END) as progress:
-        run = simulate(
-            scene, END, options.folder, options.steps(2.5e-3),
-            resume=options.resume, progress=progress,
-        )  # fmt: skip
-    if options.pictures:
-        picture_run(run, "the mandible opens by 10 degrees")
+    print(f"tongue of {scene.body.cell_count} elements on a mandible and a hyoid")
+    run = play(scene, END, options, 2.5e-3, "the mandible opens by 10 degrees")
     tip = 1e3 * run.last.displacement[scene.body.landmark("tip")]
     rows: dict[str, object] = {"tip moved, mm": f"back {tip[0]:+.2f}, up {tip[2]:+.2f}"}
     for bone, (x, z, angle) in zip(scene.rigid_bodies, run.last.rigid, strict=True):

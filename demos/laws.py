@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import ufl
 
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.units import kPa
-from dolfin_tongue.body.fibres import FloatArray
 from dolfin_tongue.constitutive import SPECIFIC_TENSION, ReportTissue, StressMobilisation
 from dolfin_tongue.view.plots import COLOURS, new_figure, save_figure, style
 
@@ -56,7 +56,8 @@ def passive_stress(strain: FloatArray, law: ReportTissue = TISSUE) -> FloatArray
 def derived_stress(strain: FloatArray, law: ReportTissue = TISSUE) -> FloatArray:
     """Return the same for one strain, shape (3, 3), from the class's energy, derived by UFL."""
     variable = ufl.variable(ufl.as_matrix(strain.tolist()))
-    energy = law.energy_density(SimpleNamespace(E_iso=variable, number=float), None)
+    fields = SimpleNamespace(value=lambda value: value)
+    energy = law.energy_density(SimpleNamespace(E_iso=variable), fields)
     stress = ufl.diff(energy, variable)
     return np.array([[float(stress[i, j](())) for j in range(3)] for i in range(3)])
 

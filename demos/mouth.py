@@ -9,10 +9,9 @@ from math import degrees
 
 from dolfin_tongue.anatomy.bones import GLIDE, OPENING
 from dolfin_tongue.anatomy.scenes import published_mouth, report_mouth
-from dolfin_tongue.app.demo import Options, progress_bar
-from dolfin_tongue.app.pictures import picture_run, read_table
+from dolfin_tongue.app.demo import Options, play
+from dolfin_tongue.app.pictures import read_table
 from dolfin_tongue.control import Recorded, SmoothRamp
-from dolfin_tongue.record.run import simulate
 from dolfin_tongue.scene.scene import Scene
 
 END = 0.6
@@ -39,14 +38,8 @@ def scene_of(options: Options) -> Scene:
 def main(options: Options) -> dict[str, object]:
     """Run the demo; returns the numbers worth printing."""
     scene = scene_of(options)
-    print(f"{scene.body.name} of {len(scene.body.cells)} elements in a mouth")
-    with progress_bar("simulated", END) as progress:
-        run = simulate(
-            scene, END, options.folder, options.steps(5e-3),
-            resume=options.resume, progress=progress,
-        )  # fmt: skip
-    if options.pictures:
-        picture_run(run, "muscles, palate, mandible, hyoid and gravity")
+    print(f"{scene.body.name} of {scene.body.cell_count} elements in a mouth")
+    run = play(scene, END, options, 5e-3, "muscles, palate, mandible, hyoid and gravity")
     steps = read_table(options.folder / "steps.csv")
     rows: dict[str, object] = {
         f"{bone.name} at the end": f"back {1e3 * x:+.2f} mm, up {1e3 * z:+.2f} mm, "

@@ -5,12 +5,11 @@ there. x points back, z up: a negative x is forward.
 """
 
 from dolfin_tongue.anatomy.scenes import report_tongue
-from dolfin_tongue.app.demo import Options, progress_bar
+from dolfin_tongue.app.demo import Options, play
 from dolfin_tongue.app.pictures import picture_shapes
 from dolfin_tongue.base.files import write_text
 from dolfin_tongue.control import Ramp
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
-from dolfin_tongue.record.run import simulate
 
 END = 0.8
 ACTIVATED_AT = 0.4
@@ -26,11 +25,8 @@ def main(options: Options) -> dict[str, object]:
     for case, muscles in cases.items():
         activation = {name: Ramp(0.5, ACTIVATED_AT) for name in muscles}
         scene = report_tongue(activation, body=body)
-        with progress_bar(f"{case:28}", END) as progress:
-            run = simulate(
-                scene, END, options.folder / case.replace(" + ", "_"),
-                options.steps(5e-3), resume=options.resume, progress=progress,
-            )  # fmt: skip
+        folder = options.folder / case.replace(" + ", "_")
+        run = play(scene, END, options, 5e-3, case, folder=folder, draw=None)
         rest = min(run.frames, key=lambda frame: abs(frame.time - ACTIVATED_AT))
         shapes[case] = run.last
         moved[case] = {

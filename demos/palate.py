@@ -5,10 +5,9 @@ dorsum, the patch in contact grows, and neither comes through the other.
 """
 
 from dolfin_tongue.anatomy.scenes import report_mouth
-from dolfin_tongue.app.demo import Options, progress_bar
-from dolfin_tongue.app.pictures import picture_run, read_table
+from dolfin_tongue.app.demo import Options, play
+from dolfin_tongue.app.pictures import read_table
 from dolfin_tongue.control import SmoothRamp
-from dolfin_tongue.record.run import simulate
 
 END = 0.5
 LEVELS = {"genioglossus_posterior": 1.0, "styloglossus": 0.6}
@@ -18,14 +17,14 @@ def main(options: Options) -> dict[str, object]:
     """Run the demo; returns the numbers worth printing."""
     activation = {name: SmoothRamp(level, 0.0, 0.3) for name, level in LEVELS.items()}
     scene = report_mouth(activation, ("palate",), 2 * options.refinement)  # a patch needs cells
-    print(f"tongue of {len(scene.body.cells)} elements under a palate")
-    with progress_bar("simulated", END) as progress:
-        run = simulate(
-            scene, END, options.folder, options.steps(2.5e-3),
-            resume=options.resume, progress=progress,
-        )  # fmt: skip
-    if options.pictures:
-        picture_run(run, "pressed to the palate by genioglossus posterior and styloglossus")
+    print(f"tongue of {scene.body.cell_count} elements under a palate")
+    run = play(
+        scene,
+        END,
+        options,
+        2.5e-3,
+        "pressed to the palate by genioglossus posterior and styloglossus",
+    )
     steps = read_table(options.folder / "steps.csv")
     area = steps["contact_area_m2"]
     touched = steps["time_s"][area > 0]

@@ -5,11 +5,9 @@ attachments.json. It rests under gravity for 200 ms before GGP rises to 50 % wit
 """
 
 from dolfin_tongue.anatomy.scenes import published_scene
-from dolfin_tongue.app.demo import Options, progress_bar
-from dolfin_tongue.app.pictures import picture_run
+from dolfin_tongue.app.demo import Options, play
 from dolfin_tongue.control import Ramp
 from dolfin_tongue.geometry.published import published_tongue
-from dolfin_tongue.record.run import simulate
 
 END = 0.5
 ACTIVATED_AT = 0.2
@@ -20,13 +18,7 @@ def main(options: Options) -> dict[str, object]:
     folder = options.need_data()
     body = published_tongue(folder)
     scene = published_scene(folder, {"GGP": Ramp(0.5, ACTIVATED_AT)}, body)
-    with progress_bar("simulated", END) as progress:
-        run = simulate(
-            scene, END, options.folder, options.steps(5e-3),
-            resume=options.resume, progress=progress,
-        )  # fmt: skip
-    if options.pictures:
-        picture_run(run, "published tongue: gravity, then GGP at 50 %")
+    run = play(scene, END, options, 5e-3, "published tongue: gravity, then GGP at 50 %")
     marks = {node: name for name, node in body.landmarks.items()}  # each node once
     moved = {name: 1e3 * run.last.displacement[node] for node, name in marks.items()}
     return {

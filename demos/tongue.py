@@ -5,11 +5,9 @@ way, to 50 % within 100 ms, and the tongue moves to another equilibrium.
 """
 
 from dolfin_tongue.anatomy.scenes import report_tongue
-from dolfin_tongue.app.demo import Options, progress_bar
-from dolfin_tongue.app.pictures import picture_run
+from dolfin_tongue.app.demo import Options, play
 from dolfin_tongue.control import SmoothRamp
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
-from dolfin_tongue.record.run import simulate
 
 END = 1.0
 ACTIVATED_AT = 0.5
@@ -23,16 +21,10 @@ def main(options: Options) -> dict[str, object]:
     scene = report_tongue(activation, body=body)
     low, high = body.scaled_jacobians.min(), body.scaled_jacobians.max()
     print(
-        f"tongue of {len(body.cells)} elements, {body.volumes.sum() * 1e6:.1f} cm3, "
+        f"tongue of {body.cell_count} elements, {body.volumes.sum() * 1e6:.1f} cm3, "
         f"scaled Jacobian {low:.2f} to {high:.2f}; compiling its forms on first use ..."
     )
-    with progress_bar("simulated", END) as progress:
-        run = simulate(
-            scene, END, options.folder, options.steps(2.5e-3),
-            resume=options.resume, progress=progress,
-        )  # fmt: skip
-    if options.pictures:
-        picture_run(run, "gravity, then all eight muscles at 50 %")
+    run = play(scene, END, options, 2.5e-3, "gravity, then all eight muscles at 50 %")
     node = body.landmark("tip")
     tip = 1e3 * run.last.displacement[node]
     return {

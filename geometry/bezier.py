@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import comb
 
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import BadMesh
-from dolfin_tongue.body.fibres import FloatArray
 
 
 def bernstein(degree: int, t: FloatArray) -> FloatArray:

@@ -15,8 +15,8 @@ from itertools import product
 import gmsh
 import numpy as np
 
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import BadMesh, OutOfRange
-from dolfin_tongue.body.fibres import FloatArray, IntArray
 
 #: Parent elements along r, s and t (report, fig. 11).
 DIVISIONS = (7, 3, 2)
@@ -27,7 +27,7 @@ Box = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 
 
 @dataclass(frozen=True)
-class Block:
+class UnitBlock:
     """A hexahedral mesh of the unit cube.
 
     Parameters
@@ -61,7 +61,7 @@ def unit_block(
     refinement: int | Sequence[int] = 1,
     regions: Mapping[str, Sequence[Box]] | None = None,
     divisions: Sequence[int] = DIVISIONS,
-) -> Block:
+) -> UnitBlock:
     """Mesh the unit block with transfinite hexahedra.
 
     Parameters
@@ -72,7 +72,7 @@ def unit_block(
 
     Returns
     -------
-    Block
+    UnitBlock
         Nodes and cells are numbered with r fastest, then s, then t.
 
     Raises
@@ -201,7 +201,7 @@ def _dimension(box: Box) -> int:
     return sum(last > first for first, last in box)
 
 
-def _extract(divisions: IntArray, factors: IntArray, entities: _Lattice) -> Block:
+def _extract(divisions: IntArray, factors: IntArray, entities: _Lattice) -> UnitBlock:
     """Read the mesh back, renumbered with r fastest so that the numbering is ours, not gmsh's."""
     fine = divisions * factors
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
@@ -223,7 +223,7 @@ def _extract(divisions: IntArray, factors: IntArray, entities: _Lattice) -> Bloc
         )
         for dimension, tag in gmsh.model.getPhysicalGroups()
     }
-    return Block(lattice / fine, joined[by_place], np.concatenate(parents)[by_place], regions)
+    return UnitBlock(lattice / fine, joined[by_place], np.concatenate(parents)[by_place], regions)
 
 
 def _brick_order(cells: IntArray, lattice: IntArray) -> IntArray:

@@ -18,11 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.units import mm
-from dolfin_tongue.body.fibres import Fibres, FloatArray, IntArray, MuscleFibres
-from dolfin_tongue.body.shape import gauss_jacobians
+from dolfin_tongue.body.block import blocks_of
+from dolfin_tongue.body.fibres import Fibres, MuscleFibres
 from dolfin_tongue.geometry.bezier import BezierSolid
-from dolfin_tongue.geometry.block import DIVISIONS, Block
+from dolfin_tongue.geometry.block import DIVISIONS, UnitBlock
 
 Parent = tuple[int, int, int]
 
@@ -104,7 +105,7 @@ CROSS_SECTIONS: Mapping[str, float] = {
 }
 
 
-def block_fibres(block: Block, solid: BezierSolid) -> Fibres:
+def block_fibres(block: UnitBlock, solid: BezierSolid) -> Fibres:
     """Fibres of the eight muscles in a refinement of the block that `solid` maps to a tongue.
 
     Parameters
@@ -122,7 +123,7 @@ def block_fibres(block: Block, solid: BezierSolid) -> Fibres:
 def _muscle(
     name: str,
     parts: tuple[Part, ...],
-    block: Block,
+    block: UnitBlock,
     solid: BezierSolid,
     volumes: Mapping[Parent, float],
 ) -> MuscleFibres:
@@ -147,11 +148,12 @@ def _spread(parts: tuple[Part, ...]) -> tuple[dict[Parent, FloatArray], dict[Par
     return steps, shares
 
 
-def _parent_volumes(block: Block, solid: BezierSolid) -> dict[Parent, float]:
+def _parent_volumes(block: UnitBlock, solid: BezierSolid) -> dict[Parent, float]:
     """Volume of every parent as its cells fill it, m3; so a force is the same in any refinement."""
-    volumes = gauss_jacobians(solid.map(block.rst), block.cells).sum(axis=1)
+    (mapped,) = blocks_of(solid.map(block.rst), {"hexahedron8": block.cells})
     total: dict[Parent, float] = {}
-    for (i, j, k), volume in zip(block.parents, volumes, strict=True):
+    for number, volume in enumerate(mapped.weights.sum(axis=1)):
+        i, j, k = block.parents[number]
         parent = (int(i), int(j), int(k))
         total[parent] = total.get(parent, 0.0) + float(volume)
     return total

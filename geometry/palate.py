@@ -19,7 +19,7 @@ import gmsh
 import numpy as np
 from scipy.special import ellipe
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray, IntArray
 from dolfin_tongue.base.errors import (
     BadScene,
     OutOfRange,
@@ -27,8 +27,7 @@ from dolfin_tongue.base.errors import (
     require_not_negative,
     require_positive,
 )
-from dolfin_tongue.base.units import mm
-from dolfin_tongue.body.body import LARGEST_SIZE
+from dolfin_tongue.base.units import LARGEST_SIZE, mm
 from dolfin_tongue.geometry.block import gmsh_model
 from dolfin_tongue.surfaces.triangles import area_vectors
 from dolfin_tongue.surfaces.triangulated import Triangulated
@@ -263,7 +262,7 @@ def _half_plan(
 
 
 def _mirrored(
-    points: FloatArray, triangles: IntArray, middle: IntArray
+    points: FloatArray, triangles: IntArray, middle: BoolArray
 ) -> tuple[FloatArray, IntArray]:
     """Join a half (y >= 0) and its mirror image along the points in the middle."""
     points = points * np.where(middle[:, None], [1.0, 0.0, 1.0], 1.0)

@@ -14,12 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import BadMesh
 from dolfin_tongue.base.units import mm
 from dolfin_tongue.body.body import TISSUE_DENSITY, Body
-from dolfin_tongue.body.fibres import FloatArray, IntArray
 from dolfin_tongue.geometry.bezier import BezierSolid
-from dolfin_tongue.geometry.block import DIVISIONS, Block, Box, unit_block
+from dolfin_tongue.geometry.block import DIVISIONS, Box, UnitBlock, unit_block
 from dolfin_tongue.geometry.muscles import block_fibres
 
 #: Control points of the right half, mm. One block per control plane from root to tip (report,
@@ -144,7 +144,7 @@ def _faces_within(body: Body, nodes: IntArray) -> IntArray:
     return body.boundary[np.isin(body.boundary, nodes).all(axis=1)]
 
 
-def _outline(block: Block) -> IntArray:
+def _outline(block: UnitBlock) -> IntArray:
     """Outline of the midsagittal sheet: underside towards the tip, tip, dorsum towards the root."""
     sheet = block.regions["midsagittal"]
     r, _, t = block.rst[sheet].T

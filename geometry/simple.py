@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import BadMesh, OutOfRange
 from dolfin_tongue.body.body import TISSUE_DENSITY, Body
+from dolfin_tongue.body.cells import BRICK_FACES
 from dolfin_tongue.body.faces import faces_between, outer_faces
-from dolfin_tongue.body.fibres import Fibres, FloatArray, IntArray, MuscleFibres
-from dolfin_tongue.body.shape import FACES
+from dolfin_tongue.body.fibres import Fibres, MuscleFibres
 
 
 def brick_cells(cells: Sequence[int]) -> IntArray:
@@ -147,14 +148,9 @@ def _uniform(name: str, direction: ArrayLike, cell_count: int) -> MuscleFibres:
     return MuscleFibres(name, np.arange(cell_count), directions, np.ones(cell_count))
 
 
-def surface_nodes(cells: IntArray) -> IntArray:
-    """Nodes of faces that belong to one cell only, sorted.
-
-    Parameters
-    ----------
-    cells : ndarray, shape (m, 8).
-    """
-    return np.unique(outer_faces(cells)[0])
+def surface_nodes(body: Body) -> IntArray:
+    """Nodes of faces that belong to one cell only, sorted."""
+    return np.setdiff1d(body.boundary, [-1])  # -1 stands for the fourth node of a triangle
 
 
 def distort(body: Body, amplitude: float = 0.2, seed: int = 0) -> Body:
@@ -177,7 +173,7 @@ def distort(body: Body, amplitude: float = 0.2, seed: int = 0) -> Body:
     """
     if not 0 <= amplitude < 0.5:
         raise OutOfRange("amplitude", amplitude, "in [0, 0.5)")
-    inside = np.setdiff1d(np.arange(len(body.points)), surface_nodes(body.cells))
+    inside = np.setdiff1d(np.arange(len(body.points)), surface_nodes(body))
     points = body.points.copy()
     step = amplitude * _shortest_edge(body)
     points[inside] += step * np.random.default_rng(seed).uniform(-1.0, 1.0, (len(inside), 3))
@@ -186,5 +182,5 @@ def distort(body: Body, amplitude: float = 0.2, seed: int = 0) -> Body:
 
 def _shortest_edge(body: Body) -> float:
     """Length of the shortest cell edge, m."""
-    corners: FloatArray = body.points[body.cells[:, FACES]]
+    corners: FloatArray = body.points[body.hexahedra[:, BRICK_FACES]]
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=2), axis=-1).min())

@@ -12,11 +12,11 @@ from dolfin_tongue.boundary import Attached, Contact, Gravity
 from dolfin_tongue.boundary.contact import Barrier, ReportContact
 from dolfin_tongue.boundary.sliding import Sliding, moved_onto
 from dolfin_tongue.constitutive import ReportTissue
-from dolfin_tongue.control import Ramp, Recorded, SmoothMove, Still
-from dolfin_tongue.direct.integrate import RungeKutta4
+from dolfin_tongue.control import Control, Motion, Ramp, Recorded, SmoothMove, Still
+from dolfin_tongue.direct import RungeKutta4
 from dolfin_tongue.geometry.palate import Palate, report_palate
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.record.recorder import fingerprint
+from dolfin_tongue.record.fingerprint import fingerprint
 from dolfin_tongue.record.run import simulate
 from dolfin_tongue.rigid import (
     AngularSpring,
@@ -28,13 +28,14 @@ from dolfin_tongue.rigid import (
     StateForce,
 )
 from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.scene.well_posed import check_static
 from dolfin_tongue.surfaces import (
     Cylinder,
     Implicit,
     Plane,
     Sphere,
     Triangulated,
-    facing,
+    faces_towards,
     overlap,
     read_surface,
 )
@@ -52,10 +53,8 @@ def bone(**changes):
     return RigidBody(**(values | changes))
 
 
-class Wrong:
-    """A motion, or a control, of a user."""
-
-    breakpoints = jumps = ()
+class Wrong(Motion):
+    """A motion of a user."""
 
     def __init__(self, value):
         self.value = value
@@ -65,8 +64,12 @@ class Wrong:
             raise ZeroDivisionError("by nothing")
         return self.value
 
+
+class TooMuch(Control):
+    """A control of a user."""
+
     def __call__(self, time):
-        return self.value
+        return 1.5
 
 
 @pytest.mark.parametrize(
@@ -90,15 +93,15 @@ def test_vectors_that_are_none(make, vector):
         (lambda: Triangulated(POINTS, FACES[:3], sheet="x"), OutOfRange, "True or False"),
         (lambda: Triangulated(POINTS, [[0, 1, 2], [0, 1]]), BadMesh, "regular array"),
         (lambda: Triangulated(POINTS, FACES, retraction=3), OutOfRange, "retraction"),
-        (lambda: Triangulated(POINTS, FACES).yielding(ORIGIN), BadMesh, r"shape \(k, 3\)"),
+        (lambda: Triangulated(POINTS, FACES).with_clearance(ORIGIN), BadMesh, r"shape \(k, 3\)"),
         (lambda: Implicit(lambda x: x[:, 2], gradient=3), OutOfRange, "gradient = 3"),
         (lambda: Implicit(lambda x: x[:, 2], lambda x: 1 / 0), OutOfRange, "gradient.*raises"),
         (lambda: Implicit(lambda x: x[:, 2], hessian=lambda x: "a"), OutOfRange, "hessian.*raises"),
         (lambda: overlap("x", POINTS), BadScene, "must be a surface"),
         (lambda: overlap(Plane(), ORIGIN), BadMesh, r"shape \(k, 3\)"),
         (lambda: overlap(Plane(), [[np.nan] * 3]), BadMesh, "finite"),
-        (lambda: facing(Plane(), BODY, 1e-3), BadScene, "a body first"),
-        (lambda: facing(BODY, Plane, 1e-3), BadScene, "must be a surface"),
+        (lambda: faces_towards(Plane(), BODY, 1e-3), BadScene, "a body first"),
+        (lambda: faces_towards(BODY, Plane, 1e-3), BadScene, "must be a surface"),
         (
             lambda: moved_onto(BODY, Cylinder(ORIGIN, (1, 0, 0), 0.01), "z0"),
             BadScene,
@@ -149,7 +152,7 @@ def test_contacts(make, error, message):
         (lambda: bone(forces=(Spring(ORIGIN, (0, 0, 90.0)),)), BadScene, "anchor of a Spring"),
         (lambda: Spring(ORIGIN, FAR, to=bone()), BadScene, "to must be the name"),
         (
-            lambda: LineMuscle(ORIGIN, FAR, activation=Wrong(1.5)),
+            lambda: LineMuscle(ORIGIN, FAR, activation=TooMuch()),
             OutOfRange,
             r"t = 0 s = 1.5.*\[0, 1\]",
         ),
@@ -196,10 +199,10 @@ def test_statics_of_what_nothing_holds(support, names):
         type(BODY)(BODY.points, BODY.cells, sets, surfaces=BODY.surfaces), TISSUE, tuple(support)
     )
     if names is None:
-        scene.check_static()
+        check_static(scene)
         return
     with pytest.raises(BadScene, match=f"nothing resists a rigid motion of {names}\\. "):
-        scene.check_static()
+        check_static(scene)
 
 
 LEVEL = 0.01
@@ -257,6 +260,22 @@ def test_a_file_that_names_missing_points(tmp_path):
 
 
 def test_moves_that_are_good_stay_so():
-    motion = (Still(), Still(), SmoothMove(np.float64(-1e-3)))
-    bones = bone(regions=["x0"], forces=[AngularSpring(1.0)], centre=np.zeros(3))
-    Scene(BODY, (*TISSUE, Contact(BELOW, motion=motion)), (bones,))
+    """Lists for tuples, an array for three numbers, a float of NumPy: the same motion."""
+
+    def last(distance, centre, several):
+        motion = (Still(), Still(), SmoothMove(distance))
+        spring = Spring(ORIGIN, FAR, stiffness=10.0, rest=0.05)
+        bones = bone(regions=several(["x0"]), forces=several([spring]), centre=centre)
+        contact = Contact(BELOW, motion=motion)
+        scene = Scene(BODY, (*TISSUE, contact), (bones,))
+        *_, state = RungeKutta4(5e-5).solver(scene).march(1e-4)
+        return state, contact.shift(0.1)[0]
+
+    plain, way = last(-1e-3, ORIGIN, tuple)
+    other, other_way = last(np.float64(-1e-3), np.zeros(3), list)
+    assert way == pytest.approx([0.0, 0.0, -5e-4])  # half of it after half of 0.2 s
+    assert (other_way == way).all()
+    assert (other.displacement == plain.displacement).all()
+    assert (other.rigid == plain.rigid).all()
+    # down: its weight is 0.98 N and more, the spring pulls up with 0.5 N
+    assert plain.rigid[0, 1] < 0

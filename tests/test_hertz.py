@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from test_contact import observed, pressed_block
+from test_rest_and_impact import pressed_block
 
 from dolfin_tongue.boundary import Attached, Barrier, Contact
 from dolfin_tongue.constitutive import MooneyRivlin
-from dolfin_tongue.control import SmoothMove, Still
-from dolfin_tongue.direct import Model, problem_of
-from dolfin_tongue.fenicsx.newton import Tolerances
-from dolfin_tongue.fenicsx.statics import Statics
+from dolfin_tongue.control import Instant, SmoothMove, Still
+from dolfin_tongue.direct import Model
+from dolfin_tongue.fenicsx import Statics, Tolerances
 from dolfin_tongue.geometry.simple import ball_body
 from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Plane
@@ -66,22 +65,20 @@ def squeezed(cells, share):
     reach = d / 50
     solver = Statics(pressed_ball(cells, share))
     state = solver.solve()
-    system = solver.system
-    system.set_state(solver.time, system.vectors(state)[0])
-    at = system.arguments(solver.time)
-    upper, lower = (part.observed(at) for part in system.couplings)
-    force = -upper["contact_1_force_z_N"]
-    assert lower["contact_2_force_z_N"] == pytest.approx(force, rel=1e-6)  # symmetric
-    near, gap, traction = system.couplings[0].traction(at)
-    share_of_force = system.couplings[0].weights[near] * traction
-    d += reach / 2 - share_of_force @ gap.distance / share_of_force.sum()
+    upper, lower = solver.contacts(state).values()
+    force = -upper.force[2]
+    assert lower.force[2] == pytest.approx(force, rel=1e-6)  # symmetric
+    surface = solver.system.couplings[0]
+    pressed = surface.pressed(solver.system.at_state(state))
+    share_of_force = surface.weights[pressed.watched.points[pressed.near]] * pressed.traction
+    d += reach / 2 - share_of_force @ pressed.gap.distance / share_of_force.sum()
 
     def approach(a):
         far, load = a**2 + 4 * BALL**2, 16 / 3 * MU * a**3 / BALL
         return a**2 / BALL - load / (3 * np.pi * MU) * (3 * BALL**2 / far**1.5 + 0.75 / far**0.5)
 
     a = brentq(lambda a: approach(a) - d, 0.0, BALL / 2)
-    radius = np.sqrt(upper["contact_1_area_m2"] / np.pi)
+    radius = np.sqrt(upper.area / np.pi)
     hertz = 16 / 3 * MU * np.sqrt(BALL) * d**1.5
     return force / hertz, force / (16 / 3 * MU * a**3 / BALL), radius / np.sqrt(BALL * d)
 
@@ -90,7 +87,7 @@ def test_hertz():
     """864 cells: 3 cells across the radius of contact at d = R/50, so about 5 % in the force."""
     hertz, tatara, radius = squeezed(6, 0.02)
     assert 1.05 < hertz < 1.2  # a/R = 0.14: a whole ball is stiffer than a half space by 10 %
-    assert tatara == pytest.approx(1.0, abs=0.1)
+    assert tatara == pytest.approx(1.0, abs=0.1)  # 1.068, and 1.046 with 8 cells per edge
     assert radius == pytest.approx(1.0, abs=0.15)
 
 
@@ -101,18 +98,16 @@ def test_what_rests_in_contact_rests_in_the_direct_solver_too(make):
     """All nodal forces there, pressures included, vanish where no support holds."""
     scene = make()
     solver = Statics(scene, Tolerances(1e-11, iterations=25, renew_above=0.0))
-    state = replace(solver.solve(), time=solver.time)
-    model = Model(problem_of(scene))
+    state = solver.solve()
+    model, now = Model(scene), Instant(solver.time)
     u, v = model.rows(state)
-    force = model.force(solver.time, u, v)
-    largest = np.abs(force).max()
-    model.add_constraint_force(model.constraint_gradients(u), model.multipliers(state), force)
-    assert np.abs(force[model.free]).max() <= 1e-6 * largest
-    shown, _ = observed(solver, state)
-    name = "contact_1" if len(model.obstacles) > 1 else "contact"
-    touch = model.obstacles[0][1].touch(solver.time, u, v)
-    assert touch.resultant[2] == pytest.approx(shown[f"{name}_force_z_N"], rel=1e-9)
-    assert touch.area == pytest.approx(shown[f"{name}_area_m2"], rel=1e-9)
+    largest = np.abs(model.force(now, u, v)).max()
+    force = model.balance(state, u, v)
+    assert np.abs(force[model.numbering.free]).max() <= 1e-6 * largest
+    obstacle = model.obstacles[0]
+    touch, other = obstacle.touch(model.at(now, u, v)), solver.contacts(state)[obstacle.labels[0]]
+    assert touch.force[2] == pytest.approx(other.force[2], rel=1e-9)
+    assert touch.area == pytest.approx(other.area, rel=1e-9)
 
 
 @pytest.mark.slow

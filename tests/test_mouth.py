@@ -12,7 +12,7 @@ from dolfin_tongue.anatomy.scenes import CLEARANCE, SURROUNDINGS, published_mout
 from dolfin_tongue.base.errors import TongueError
 from dolfin_tongue.boundary import Contact
 from dolfin_tongue.control import SmoothRamp
-from dolfin_tongue.direct import Direct, Implicit
+from dolfin_tongue.direct import TrBdf2
 
 pytest.importorskip("dolfinx")
 
@@ -24,9 +24,9 @@ PRESSED = {
 
 def last_of(scene, end, dt, name):
     """Last state of one of the solvers."""
-    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx import GeneralisedAlpha
 
-    solver = Dynamics(scene, TimeSteps(dt)) if name == "fenicsx" else Direct(scene, Implicit(dt))
+    solver = GeneralisedAlpha(dt).solver(scene) if name == "fenicsx" else TrBdf2(dt).solver(scene)
     *_, last = solver.march(end)
     return last
 

@@ -4,17 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dolfinx import fem
 
 from dolfin_tongue.base.errors import BadMesh, OutOfRange, UnknownName
 from dolfin_tongue.body.faces import areas
 from dolfin_tongue.boundary import Attached, Skin, SurfaceTension
 from dolfin_tongue.constitutive import ReportTissue, Viscosity
-from dolfin_tongue.direct import Model, Problem, problem_of
-from dolfin_tongue.fenicsx.mesh import PAIRS
-from dolfin_tongue.fenicsx.statics import Statics
-from dolfin_tongue.fenicsx.system import System
+from dolfin_tongue.control import Instant
+from dolfin_tongue.direct import Model
+from dolfin_tongue.direct.choice import parts_of
+from dolfin_tongue.fenicsx import GeneralisedAlpha, Statics, System
+from dolfin_tongue.fenicsx.arguments import Arguments
+from dolfin_tongue.fenicsx.pairs import PAIRS
 from dolfin_tongue.geometry.simple import ball_body, block_body
+from dolfin_tongue.record.observe import EnergyAudit
 from dolfin_tongue.scene.scene import Scene
 
 BODY = block_body((0.03, 0.02, 0.01), (3, 2, 1))
@@ -23,13 +25,11 @@ BODY = block_body((0.03, 0.02, 0.01), (3, 2, 1))
 def nodal_forces(body, term, displacement):
     """Inner forces of a term from both solvers, which agree; shape (n, 3), N."""
     scene = Scene(body, (term,))
-    model = Model(problem_of(scene))
-    mine = -model.force(0.0, displacement, 0 * displacement)
+    model = Model(scene)
+    mine = -model.force(Instant(0.0), displacement, 0 * displacement)
     system = System(scene, dynamic=True)
-    y = system.mixed(displacement)
-    system.set_state(0.0, y, 0 * y, 0 * y, y)
-    out = np.zeros(system.space.size)
-    system.residual(0.0, out)
+    y, out = system.vector(displacement), np.zeros(system.size)
+    system.residual(Arguments(Instant(0.0), 0.0, y, 0 * y, 0 * y, y), out)
     assert np.abs(system.displacement(out) - mine).max() <= 1e-12 * np.abs(mine).max()
     return mine
 
@@ -71,23 +71,21 @@ def test_unknown_surface_lists_the_known_ones():
         Scene(BODY, (SurfaceTension(1.0, surface="top"),))
     with pytest.raises(UnknownName, match="unknown surface"):
         Scene(BODY, (Skin(1e3, 1e-3, surface="top"),))
-    problem = Problem(
-        problem_of(Scene(BODY, (ReportTissue(),))).mesh, (Skin(1.0, 1.0, "top"),), 1.0
-    )
     with pytest.raises(UnknownName, match=r"known surface names: boundary"):
-        Model(problem)
+        parts_of(BODY, [("skin", Skin(1.0, 1.0, "top"))])
 
 
 @pytest.mark.parametrize(
     ("faces", "message"),
     [
-        (BODY.surface("z1")[:, ::-1], r"'film': quadrilateral\(s\) 0, 1, 2, .* point inward"),
+        (BODY.surface("z1")[:, ::-1], r"'film': face\(s\) 0, 1, 2, .* point inward"),
         (BODY.surface("z1")[:, [0, 2, 1, 3]], "cross themselves"),
-        (BODY.cells[:1, [1, 2, 6, 5]], r"quadrilateral\(s\) 0 are not the face of exactly one"),
+        (BODY.cells[:1, [1, 2, 6, 5]], r"face\(s\) 0 are not the face of exactly one"),
         (np.array([[0, 1, 2, 3]]), "not the face of exactly one cell"),
-        (BODY.surface("z1")[[0, 1, 0]], "names a quadrilateral twice"),
+        (BODY.surface("z1")[[0, 1, 0]], "names a face twice"),
         (np.zeros((0, 4), dtype=int), "is empty"),
-        (np.zeros((2, 3), dtype=int), r"shape \(k, 4\)"),
+        (np.zeros((2, 3), dtype=int), "not the face of exactly one cell"),  # triangles
+        (np.zeros((2, 5), dtype=int), r"shape \(k, 4\)"),
         (np.zeros((2, 4)), "not float64"),
     ],
 )
@@ -116,9 +114,12 @@ def test_numbers_without_physical_sense(bad):
 def test_a_scene_without_surface_terms_has_no_surface_integrals():
     plain = System(Scene(BODY, (ReportTissue(),)), True)
     film = System(Scene(BODY, (ReportTissue(), SurfaceTension(1.0))), True)
-    assert set(plain.residual_form.integrals_by_type("exterior_facet")) == set()
-    assert len(film.residual_form.integrals_by_type("exterior_facet")) == 1
-    assert not plain.fields._facets
+    assert [block.domain.surface for block in plain.blocks] == [None]
+    assert [block.domain.surface for block in film.blocks] == [None, "boundary"]
+    for system in (plain, film):
+        assert not system.volume.residual_form.integrals_by_type("exterior_facet")
+    assert len(film.blocks[1].residual_form.integrals()) == 1
+    assert len(film.blocks[1].domain.owners) == len(BODY.boundary)
 
 
 # -- closed forms ---------------------------------------------------------------------------------
@@ -128,12 +129,14 @@ def test_a_scene_without_surface_terms_has_no_surface_integrals():
 def test_energy_of_every_pair_of_spaces(pair):
     """At rest the energy is sigma times the area, also of surfaces that overlap."""
     terms = (SurfaceTension(2.0), SurfaceTension(5.0, "z1"), Skin(1e3, 1e-3, "x0"))
-    system = System(Scene(BODY, terms), True, pair)
-    kin = system.kinematics(system.state, system.rate)
-    energies = [fem.assemble_scalar(fem.form(t.energy(kin, system.fields))) for t in terms]
+    scene = Scene(BODY, terms)
+    solver = GeneralisedAlpha(1e-3, pair=pair).solver(scene)
+    rest, system = solver.rest(), solver.system
+    found = solver.energies(rest)
+    energies = [found[label] for label in scene.labels]
     assert energies == pytest.approx([2.0 * 2.2e-3, 5.0 * 6e-4, 0.0], abs=1e-15)
-    out = np.zeros(system.space.size)
-    system.residual(0.0, out)
+    out = np.zeros(system.size)
+    system.residual(system.at_state(rest), out)
     assert np.abs(out).max() > 1e-3
 
 
@@ -181,19 +184,16 @@ def test_inflated_skin_and_static_film_find_equilibrium():
         np.ptp((BODY.points + s.displacement)[np.unique(BODY.surface("z1"))], axis=0)[0]
         for s in states
     ]
-    assert states[-1].time == 1.0
+    assert states[-1].load == 1.0
     assert lengths[-1] < lengths[0] < 0.03
 
 
 def test_the_energy_audit_counts_surfaces():
-    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
-    from dolfin_tongue.record.observe import EnergyAudit
-
     scene = Scene(BODY, (ReportTissue(), Viscosity(20.0), SurfaceTension(1.0), Skin(5e3, 1e-3)))
     errors = []
     for dt in (1e-3, 5e-4):
-        solver = Dynamics(scene, TimeSteps(dt))
-        audit = EnergyAudit(solver.system)
+        solver = GeneralisedAlpha(dt).solver(scene)
+        audit = EnergyAudit(solver, scene)
         balances = [audit.update(state) for state in solver.march(0.02)]
         errors.append(max(abs(b["balance_J"]) for b in balances) / balances[-1]["exchanged_J"])
     assert {"surface_tension_J", "skin_J"} <= set(balances[-1])

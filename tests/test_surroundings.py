@@ -14,24 +14,28 @@ from PIL import Image
 
 from dolfin_tongue import view
 from dolfin_tongue.app import pictures
+from dolfin_tongue.body.state import State
 from dolfin_tongue.boundary import Attached, Contact, Sliding
 from dolfin_tongue.constitutive import ReportTissue
 from dolfin_tongue.control import Ramp
 from dolfin_tongue.control.motion import SmoothMove, Still
+from dolfin_tongue.direct import TrBdf2
 from dolfin_tongue.geometry.palate import report_palate
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.march.state import State
+from dolfin_tongue.record.frames import Frames
 from dolfin_tongue.record.run import Run
 from dolfin_tongue.rigid import LineMuscle, RigidBody, Spring, plane
 from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Implicit, Plane, Sphere
 from dolfin_tongue.view import contact as contact_view
-from dolfin_tongue.view.bones import MUSCLE, Skeleton, best_fit, hull, zigzag
+from dolfin_tongue.view.bones import Skeleton, best_fit, hull, zigzag
 from dolfin_tongue.view.camera import SIDE
 from dolfin_tongue.view.film import Film
+from dolfin_tongue.view.palette import MUSCLE
 from dolfin_tongue.view.plots import contact_names, rigid_names
-from dolfin_tongue.view.surroundings import Surroundings, Wall
+from dolfin_tongue.view.surroundings import Surroundings
+from dolfin_tongue.view.walls import Wall
 
 pytestmark = pytest.mark.skipif(
     not os.environ.get("DISPLAY") and shutil.which("Xvfb") is None,
@@ -214,7 +218,7 @@ def test_coordinates_follow_from_attached_nodes(tongue, jaw, hyoid):
 def test_lines_end_at_their_bodies(tongue, jaw, hyoid):
     skeleton = Skeleton(tongue, (jaw, hyoid))
     lines = skeleton.lines(state_of(tongue, rigid=[[0, 0, -0.1], [0, 5e-3, 0]]))
-    (_, spring), (_, muscle) = lines
+    (_, _, spring), (_, _, muscle) = lines
     np.testing.assert_array_equal(spring[1], [0.06, 0, 0.03])  # the skull stays
     np.testing.assert_allclose(muscle[1], [0.09, 0, 0.045])  # the hyoid rises
     arm = muscle[0] - jaw.pivot
@@ -335,7 +339,10 @@ def test_plots(tmp_path):
 def test_pictures_of_a_run(tongue, palate, jaw, tmp_path):
     lone = replace(jaw, forces=jaw.forces[:1])
     scene = scene_of(tongue, Contact(palate), supports=(lone,))
-    frames = [state_of(tongue, time, rigid=[[0, 0, -time]]) for time in TIME]
+    bare = replace(scene, body=replace(tongue, fibres=type(tongue.fibres)()))
+    frames = Frames(tmp_path, bare.body)
+    for time in TIME:
+        frames.append(state_of(tongue, time, rigid=[[0, 0, -time]]))
     tip = {f"tip_{axis}_m": TIME for axis in "xyz"}
     for name, columns in (("trajectories", tip | RIGID), ("steps", CONTACT | {"kinetic_J": TIME})):
         table = {"time_s": TIME} | columns
@@ -343,8 +350,7 @@ def test_pictures_of_a_run(tongue, palate, jaw, tmp_path):
             tmp_path / f"{name}.csv", np.stack(list(table.values()), axis=1), delimiter=",",
             header=",".join(table), comments="",
         )  # fmt: skip
-    bare = replace(scene, body=replace(tongue, fibres=type(tongue.fibres)()))
-    run = Run(bare, tmp_path, frames, frames[-1])
+    run = Run(bare, TrBdf2(), tmp_path, frames, frames[-1])
     pictures.picture_run(run, "palate")
     made = {path.name for path in tmp_path.glob("*.*") if path.suffix in (".png", ".gif")}
     assert made >= {"sheet.png", "animation.gif", "shape.png", "pressure.png"}

@@ -10,10 +10,11 @@ import pytest
 
 from dolfin_tongue.anatomy.scenes import published_scene, report_tongue
 from dolfin_tongue.app import demo
+from dolfin_tongue.body.shape import volume_changes
 from dolfin_tongue.control import Constant
-from dolfin_tongue.fenicsx.statics import Statics
+from dolfin_tongue.fenicsx import Statics
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
-from dolfin_tongue.record.observe import volume_changes
+from dolfin_tongue.geometry.published import published_tongue
 
 MM = 1e-3
 
@@ -119,6 +120,7 @@ def test_demo_with_the_direct_solver_gives_the_same_motion(tmp_path):
         assert summary["solver"].lower() == solver and summary["max_volume_change"] <= 1e-8
         paths = np.genfromtxt(folder / "trajectories.csv", delimiter=",", names=True)
         last[solver] = np.array([paths[f"tip_{axis}_m"] for axis in "xyz"])
+    # both are of order 2: they are 0.018, 0.0047, 0.0012 mm apart at dt 5, 2.5 (here), 1.25 ms
     assert np.abs(last["direct"] - last["fenicsx"]).max() < 0.02 * MM
 
 
@@ -142,8 +144,6 @@ def test_unknown_demo_lists_the_known_ones():
 
 def test_published_tongue_sags_and_ggp_moves_it_forward(published_folder):
     """740 elements: equilibrium under gravity and with GGP at 30 %."""
-    from dolfin_tongue.geometry.published import published_tongue
-
     body = published_tongue(published_folder)
     rest = Statics(published_scene(published_folder, {}, body)).solve()
     active = Statics(published_scene(published_folder, {"GGP": Constant(0.3)}, body)).solve()

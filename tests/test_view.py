@@ -15,15 +15,15 @@ from PIL import Image
 
 from dolfin_tongue import view
 from dolfin_tongue.base.errors import BadMesh, OutOfRange, UnknownName
+from dolfin_tongue.body.state import State
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.march.state import State
 from dolfin_tongue.view import display
 from dolfin_tongue.view.camera import Camera, View
 from dolfin_tongue.view.canvas import nice_below, spoken
 from dolfin_tongue.view.fibres import fibre_segments
 from dolfin_tongue.view.fields import deformation_gradients, largest_stretch
-from dolfin_tongue.view.surface import Surface
+from dolfin_tongue.view.skin import Skin
 
 needs_display = pytest.mark.skipif(
     not os.environ.get("DISPLAY") and shutil.which("Xvfb") is None,
@@ -88,7 +88,7 @@ def test_camera_fits_its_points(body):
 
 
 def test_surface_of_a_block(body):
-    surface = Surface(body, cuts=3)
+    surface = Skin(body, cuts=3)
     assert len(surface.faces) == 2 * (4 * 2 + 4 * 2 + 2 * 2)
     normals = surface.normals(body.points)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
@@ -99,7 +99,7 @@ def test_surface_of_a_block(body):
 
 
 def test_smooth_surface_shares_normals():
-    surface = Surface(preliminary_tongue(), cuts=1)
+    surface = Skin(preliminary_tongue(), cuts=1)
     points = surface.points(preliminary_tongue().points)
     normals = surface.normals(preliminary_tongue().points)
     _, group = np.unique(points.round(9), axis=0, return_inverse=True)
@@ -126,15 +126,15 @@ def test_words_and_numbers():
     assert spoken("GGP_L") == "genioglossus posterior (L)"
 
 
-def test_telling_frames_prefer_motion(body):
+def test_key_frames_prefer_motion(body):
     lifts = np.concatenate([np.zeros(50), np.linspace(0, 0.01, 11), np.full(40, 0.01)])
     states = [state_of(body, 0.01 * k, lift) for k, lift in enumerate(lifts)]
-    chosen = view.telling_frames(states, 11)
+    chosen = view.key_frames(states, 11)
     times = np.array([state.time for state in chosen])
     assert len(chosen) == 11 and times[0] == 0 and times[-1] == states[-1].time
     assert ((times > 0.49) & (times < 0.61)).sum() >= 5
-    assert view.telling_frames(states[:3], 11) == states[:3]
-    assert len({id(state) for state in view.telling_frames(states, 90)}) == 90
+    assert view.key_frames(states[:3], 11) == states[:3]
+    assert len({id(state) for state in view.key_frames(states, 90)}) == 90
 
 
 def test_no_display_is_said_clearly(monkeypatch):

@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from dolfin_tongue.anatomy.bones import hyoid, mandible, opening
 from dolfin_tongue.anatomy.scenes import report_mouth, report_tongue
+from dolfin_tongue.body.state import State
 from dolfin_tongue.boundary import Attached, Barrier, Contact, Gravity, Sliding, moved_onto
 from dolfin_tongue.constitutive import ReportTissue, Viscosity
 from dolfin_tongue.control import SmoothMove, SmoothRamp, Still
 from dolfin_tongue.geometry.palate import report_palate
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.march.state import State
 from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Plane, Sphere
 

@@ -7,28 +7,24 @@ import json
 import re
 import time as clock
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import NotConverged, TongueError
-from dolfin_tongue.direct.integrate import Direct, Method
-from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
-from dolfin_tongue.march.state import State
-from dolfin_tongue.record.observe import volume_changes
-from dolfin_tongue.record.recorder import Recorder
-from dolfin_tongue.record.run import simulate
+from dolfin_tongue.body.shape import volume_changes
+from dolfin_tongue.body.state import State
+from dolfin_tongue.record.run import Method, simulate
 from dolfin_tongue.scene.scene import Scene
 
 #: Largest relative volume change of a cell of which we say that the volumes are kept.
 KEPT = 1e-8
 
-#: Files that every FEniCSx run must leave, however it ends.
+#: Files that every recorded run must leave, however it ends.
 FILES = ("summary.json", "steps.csv", "trajectories.csv", "checkpoint.npz", "fields.xdmf")
 
 
@@ -48,9 +44,10 @@ class Outcome:
     time : last accepted time, s.
     steps : accepted steps.
     cause : why it ended, in full; empty if it finished.
+    reason : the same in a few words, where the run itself says so.
     volume : largest relative volume change of a cell at any accepted state.
     wall : wall time, s.
-    times, energies : of the accepted states, s and J; energies where they were recorded.
+    times, energies : of the accepted states, s and J.
     last : last accepted state.
     """
 
@@ -58,6 +55,7 @@ class Outcome:
     time: float = 0.0
     steps: int = 0
     cause: str = ""
+    reason: str = ""
     volume: float = 0.0
     wall: float = 0.0
     times: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
@@ -71,56 +69,96 @@ class Outcome:
             kept = "" if self.kind == "finished" else " (not kept)"
             return f"finished, dV {self.volume:.0e}{kept}"
         at = "" if self.kind == "refused" else f" at {self.time:.4g} s"
-        return f"{self.kind}{at}: {short_cause(self.cause)}"
+        return f"{self.kind}{at}: {self.reason or short_cause(self.cause)}"
 
 
 def short_cause(text: str) -> str:
-    """Cut the list of cells and the advice out of a message."""
+    """Cut a refusal to what allows which step; other messages lose their advice."""
     found = re.search(r"stability limit, which (.*?)( \(fastest [^)]*\))? sets to (\S+)", text)
     if found:
         return f"{found.group(1)} allows {1e3 * float(found.group(3)):.3g} ms"
-    text = text.partition(" Most distorted cells")[0].rstrip(".") + _advice(text)
-    found = re.search(r"Cause: (.*)$", text)
-    text = found.group(1) if found else re.sub(r"^no convergence beyond t = \S+ ", "", text)
-    return re.sub(r": (lower|try) .*$", "", text).strip().rstrip(".;")
+    return text.partition(": try ")[0].strip().rstrip(".;")
 
 
-def _advice(text: str) -> str:
-    """Cause that a FEniCSx run names after its list of cells, up to the colon."""
-    found = re.search(r"det F [^;]*; ([^:]*)(: |$)", text)
-    return f"; {found.group(1)}" if found else ""
+def in_short(error: NotConverged) -> str:
+    """Reason of a run that stopped, and how distorted the cells were by then."""
+    found = error.diagnosis
+    if not found.cells:
+        return error.reason
+    worst = f"det F {found.smallest_ratio:.2g} in cell {found.cells[0]}"
+    return f"{error.reason}; {worst}, largest stretch {found.largest_stretch:.2g}"
 
 
-def attempt_alpha2(
-    scene: Scene, end: float, folder: Path, steps: TimeSteps, limit: float = 60.0
+@dataclass
+class Ending:
+    """How a run ended: `Outcome.kind`, cause and reason."""
+
+    kind: str
+    cause: str = ""
+    reason: str = ""
+
+
+def ending_of(run: Callable[[], None], begun: Callable[[], bool]) -> Ending:
+    """Run something to its end.
+
+    Parameters
+    ----------
+    run : may raise anything.
+    begun : whether it came further than its start, asked when it was refused.
+    """
+    try:
+        run()
+    except GivenUp as error:
+        return Ending("throttled", str(error))
+    except NotConverged as error:
+        return Ending("stopped", str(error), in_short(error))
+    except TongueError as error:
+        return Ending("stopped" if begun() else "refused", str(error))
+    except Exception as error:  # whatever else comes is what this benchmark looks for
+        return Ending("fault", _crash(error))
+    return Ending("finished")
+
+
+def attempt(
+    scene: Scene,
+    end: float,
+    folder: Path,
+    method: Method,
+    start: State | None = None,
+    limit: float = 60.0,
 ) -> Outcome:
     """Run a scene with `run.simulate` and judge what it left on disk.
 
     Parameters
     ----------
-    scene, end, folder, steps : as for `run.simulate`.
+    scene, end, folder, method, start : as for `run.simulate`.
     limit : wall time after which the run is given up, s.
     """
-    begin = clock.perf_counter()
+    begin, reached, last = clock.perf_counter(), [], []
 
     def watch(time: float) -> None:
-        if clock.perf_counter() - begin > limit:
-            raise GivenUp(f"given up after {limit:g} s of wall time")
+        reached.append(time)
+        _give_up(clock.perf_counter() - begin, limit)
 
-    kind, cause, last = "finished", "", None
-    try:
-        last = simulate(scene, end, folder, steps, frame_interval=end / 4, progress=watch).last
-    except GivenUp as error:
-        kind, cause = "throttled", str(error)
-    except NotConverged as error:
-        kind, cause = "stopped", str(error)
-    except TongueError as error:
-        return Outcome("refused", cause=str(error), wall=clock.perf_counter() - begin)
-    except Exception as error:  # whatever else comes is what this benchmark looks for
-        kind, cause = "fault", _crash(error)
-    outcome = _from_files(folder, kind, cause)
-    outcome.wall, outcome.last = clock.perf_counter() - begin, last
-    return _judged(outcome, end)
+    def run() -> None:
+        named = {"frame_interval": end / 4, "progress": watch}
+        last.append(simulate(scene, end, folder, method, start=start, **named).last)
+
+    ending = ending_of(run, lambda: bool(reached))
+    if ending.kind == "refused":
+        outcome = Outcome("refused", cause=ending.cause)
+    else:
+        outcome = _judged(_from_files(folder, ending), end)
+    outcome.wall, outcome.last = clock.perf_counter() - begin, last[0] if last else None
+    return outcome
+
+
+def _give_up(wall: float, limit: float, steps: int = 0, most: int | None = None) -> None:
+    """Raise GivenUp for a run that takes too long or too many steps."""
+    if wall > limit:
+        raise GivenUp(f"given up after {limit:g} s of wall time")
+    if most and steps > most:
+        raise GivenUp(f"given up after {most} steps")
 
 
 def _crash(error: Exception) -> str:
@@ -129,19 +167,19 @@ def _crash(error: Exception) -> str:
     return f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
 
 
-def _from_files(folder: Path, kind: str, cause: str) -> Outcome:
+def _from_files(folder: Path, ending: Ending) -> Outcome:
     """Outcome as the files tell it; a fault where they do not."""
     missing = [name for name in FILES if not (folder / name).is_file()]
     if missing:
-        return Outcome("fault", cause=f"no {', '.join(missing)} on disk; {cause}")
+        return Outcome("fault", cause=f"no {', '.join(missing)} on disk; {ending.cause}")
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     rows = read_table(folder / "steps.csv")
     energy = sum(rows[name] for name in rows if name.endswith("_J") and _is_energy(name))
     outcome = Outcome(
-        kind, summary["time_reached_s"], len(rows["time_s"]) - 1, cause,
-        summary["max_volume_change"], times=rows["time_s"], energies=energy,
+        ending.kind, summary["time_reached_s"], len(rows["time_s"]) - 1, ending.cause,
+        ending.reason, summary["max_volume_change"], times=rows["time_s"], energies=energy,
     )  # fmt: skip
-    if (kind == "finished") != (summary["status"] == "finished"):
+    if (ending.kind == "finished") != (summary["status"] == "finished"):
         return _fault(outcome, f"summary.json says {summary['status']!r}")
     if abs(rows["time_s"][-1] - outcome.time) > 1e-12:
         return _fault(outcome, "the last accepted state is not in steps.csv")
@@ -156,6 +194,7 @@ def _is_energy(name: str) -> bool:
 
 def _fault(outcome: Outcome, what: str) -> Outcome:
     outcome.kind, outcome.cause = "fault", f"{what}; {outcome.cause}".rstrip("; ")
+    outcome.reason = ""
     return outcome
 
 
@@ -181,20 +220,18 @@ def _judged(outcome: Outcome, end: float) -> Outcome:
 def attempt_march(
     scene: Scene,
     end: float,
-    method: Method | TimeSteps,
-    folder: Path | None = None,
+    method: Method,
     start: State | None = None,
     limit: float = 60.0,
     most: int | None = None,
 ) -> tuple[Outcome, list[State]]:
-    """Run a scene by stepping through it here, with either solver.
+    """Run a scene by stepping through it here, without files.
 
     Parameters
     ----------
     scene : body, terms, supports.
     end : s.
-    method : a method of the direct solver, or `TimeSteps` for FEniCSx.
-    folder : for the tables of the run; None for no files.
+    method : of either solver.
     start : state to start from; default: at rest in the reference configuration.
     limit : wall time after which the run is given up, s.
     most : accepted steps after which it is given up.
@@ -206,59 +243,30 @@ def attempt_march(
     begin = clock.perf_counter()
     states: list[State] = []
     energies: list[float] = []
-    kind, cause = "finished", ""
-    recorder = None if folder is None else Recorder(folder, scene, end / 4)
-    try:
-        solver = Dynamics(scene, method) if isinstance(method, TimeSteps) else Direct(scene, method)
-        for state, volume, energy in _observed(solver, scene, end, start):
+
+    def run() -> None:
+        solver = method.solver(scene)
+        for state in solver.march(end, start):
             states.append(state)
-            energies.append(energy)
-            if recorder:
-                recorder.record(state, {"max_volume_change": volume, "energy_J": energy})
+            energies.append(sum(solver.energies(state).values()))
             if state.time < end:
                 _give_up(clock.perf_counter() - begin, limit, len(states), most)
-    except GivenUp as error:
-        kind, cause = "throttled", f"{error}, at a step of {states[-1].step:.1e} s"
-    except NotConverged as error:
-        kind, cause = "stopped", str(error)
-    except TongueError as error:
-        kind, cause = ("stopped" if states else "refused"), str(error)
-    except Exception as error:  # whatever else comes is what this benchmark looks for
-        kind, cause = "fault", _crash(error)
-    finally:
-        if recorder:
-            recorder.close()
-    outcome = _from_states(scene, states, kind, cause)
+
+    ending = ending_of(run, lambda: bool(states))
+    if ending.kind == "throttled":
+        ending.cause += f", at a step of {states[-1].step:.1e} s"
+    outcome = _from_states(scene, states, ending)
     outcome.energies, outcome.wall = np.array(energies), clock.perf_counter() - begin
     return _judged(outcome, end), states
 
 
-def _give_up(wall: float, limit: float, steps: int, most: int | None) -> None:
-    """Raise GivenUp for a run that takes too long or too many steps."""
-    if wall > limit:
-        raise GivenUp(f"given up after {limit:g} s of wall time")
-    if most and steps > most:
-        raise GivenUp(f"given up after {most} steps")
-
-
-def _observed(
-    solver: Any, scene: Scene, end: float, start: State | None
-) -> Iterator[tuple[State, float, float]]:
-    """March; yields accepted states with volume change and energy (0 from FEniCSx)."""
-    model = getattr(solver, "model", None)
-    for state in solver.march(end, start):
-        volume = float(np.abs(volume_changes(scene.body, state.displacement)).max())
-        energy = model.energy(state.displacement, state.velocity) if model else 0.0
-        yield state, volume, energy
-
-
-def _from_states(scene: Scene, states: list[State], kind: str, cause: str) -> Outcome:
+def _from_states(scene: Scene, states: list[State], ending: Ending) -> Outcome:
     if not states:
-        return Outcome(kind, cause=cause)
+        return Outcome(ending.kind, cause=ending.cause, reason=ending.reason)
     changes = [np.abs(volume_changes(scene.body, s.displacement)).max() for s in states]
     outcome = Outcome(
-        kind, states[-1].time, len(states) - 1, cause, float(max(changes)),
-        times=np.array([s.time for s in states]), last=states[-1],
+        ending.kind, states[-1].time, len(states) - 1, ending.cause, ending.reason,
+        float(max(changes)), times=np.array([s.time for s in states]), last=states[-1],
     )  # fmt: skip
     fields = [x for s in states for x in (s.displacement, s.velocity, s.pressure)]
     if not all(np.isfinite(x).all() for x in fields):

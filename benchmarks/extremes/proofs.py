@@ -10,12 +10,12 @@ import numpy as np
 from scipy.special import ellipk
 
 from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.body.state import State
 from dolfin_tongue.boundary import Gravity, Sliding, moved_onto
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
 from dolfin_tongue.control import Still
-from dolfin_tongue.direct import Model, problem_of
+from dolfin_tongue.direct import Model
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.march.state import State
 from dolfin_tongue.rigid import RigidBody
 from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.surfaces import Sphere
@@ -37,13 +37,13 @@ def block_in_bowl() -> Scene:
 
 def nodal_masses(scene: Scene) -> FloatArray:
     """Lumped masses of the nodes, shape (n,), kg."""
-    mass = Model(problem_of(Scene(scene.body, (MooneyRivlin(),)))).mass
+    mass = Model(Scene(scene.body, (MooneyRivlin(),))).mass
     return np.asarray(mass.sum(axis=1)).ravel()
 
 
 def exact_period(scene: Scene) -> float:
     """Period of a physical pendulum about the bowl's centre, 4 sqrt(I/(m g L)) K(sin^2(A/2)), s."""
-    mass = Model(problem_of(Scene(scene.body, (MooneyRivlin(),)))).mass
+    mass = Model(Scene(scene.body, (MooneyRivlin(),))).mass
     arm = scene.body.points - np.asarray(BOWL.centre)
     inertia = sum(float(arm[:, i] @ (mass @ arm[:, i])) for i in (0, 2))
     first = -float(np.sum(mass @ arm[:, 2]))

@@ -20,7 +20,7 @@ from dolfin_tongue.constitutive import (
 from dolfin_tongue.control import Control, Ramp, SmoothRamp
 from dolfin_tongue.geometry.simple import block_body, surface_nodes
 from dolfin_tongue.scene.scene import Scene
-from dolfin_tongue.terms.term import Held
+from dolfin_tongue.terms.support import Held
 
 #: The dynamic block of the comparison with FEBio: size, m, and first modulus, Pa.
 FEBIO_SIZE = (0.02, 0.01, 0.01)
@@ -70,7 +70,7 @@ def muscle_block(factor: float = 1.0, viscosity: float = 10.0, body: Body | None
 def bad_block(quality: float = 0.05) -> Body:
     """Block whose worst cells have the given scaled Jacobian: all inner nodes are moved alike."""
     body = block_body((0.04, 0.03, 0.03), (4, 3, 3), muscles={"pull": (1.0, 0.0, 0.3)})
-    inside = np.setdiff1d(np.arange(len(body.points)), surface_nodes(body.cells))
+    inside = np.setdiff1d(np.arange(len(body.points)), surface_nodes(body))
     low, high = 0.0, 0.0099
     for _ in range(60):
         middle = (low + high) / 2

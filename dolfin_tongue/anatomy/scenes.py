@@ -12,6 +12,7 @@ from dolfin_tongue.anatomy.bones import hyoid, mandible
 from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import BadScene, UnknownName
 from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.faces import corners_of
 from dolfin_tongue.boundary import Attached, Contact, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, MooneyRivlin, ReportTissue, Viscosity
 from dolfin_tongue.control import Control, Motion
@@ -19,8 +20,8 @@ from dolfin_tongue.geometry.palate import report_palate
 from dolfin_tongue.geometry.preliminary import preliminary_tongue
 from dolfin_tongue.geometry.published import published_tongue
 from dolfin_tongue.scene.scene import Scene
-from dolfin_tongue.surfaces import facing, read_surface
-from dolfin_tongue.terms.term import Support
+from dolfin_tongue.surfaces import faces_towards, read_surface
+from dolfin_tongue.terms.support import Support
 
 #: Viscosity of the tongues, Pa s: the stiffness damping of the published tongue (0.03 s) times its
 #: shear modulus (2.07 kPa), rounded. Without it the sag under gravity rings for seconds.
@@ -120,7 +121,7 @@ def published_mouth(
     """Build the published tongue with its palate, mandible and hyoid.
 
     The palate overlaps the tongue at rest by up to 0.7 mm; it is dented there, so that
-    `CLEARANCE` is left (see `Triangulated.yielding`).
+    `CLEARANCE` is left (see `Triangulated.with_clearance`).
 
     Parameters
     ----------
@@ -132,8 +133,8 @@ def published_mouth(
     scene = published_scene(folder, activation)
     if "palate" in parts:
         body, palate = scene.body, read_surface(folder / "palate.obj", sheet=True)
-        faces = facing(body, palate, FACING, OVERLAP)
-        palate = palate.yielding(face_samples(body, faces), CLEARANCE)
+        faces = faces_towards(body, palate, FACING, OVERLAP)
+        palate = palate.with_clearance(face_samples(body, faces), CLEARANCE)
         body = replace(body, surfaces={**body.surfaces, "palatal": faces})
         scene = replace(scene, body=body)
     carried = {"mandible": "jaw", "hyoid": "hyoid"}
@@ -176,6 +177,7 @@ def _in_mouth(
 
 def face_samples(body: Body, faces: IntArray) -> FloatArray:
     """Nodes and quadrature points of outer faces of a body at rest, shape (k, 3), m."""
+    faces = corners_of(faces)
     corners = body.points[faces]
     a, b = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
     weights = np.array([a * a, a * b, b * b, a * b])

@@ -1,4 +1,4 @@
-"""How demos and benchmarks are found, and what they are given."""
+"""How demos and benchmarks are found, what they are given, and how a demo is played."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from typing import Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from dolfin_tongue.app.pictures import picture_run
 from dolfin_tongue.base.errors import TongueError, UnknownName, require_positive
-from dolfin_tongue.direct.tr_bdf2 import Implicit
-from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
+from dolfin_tongue.direct import TrBdf2
+from dolfin_tongue.record.run import Method, Run, simulate
+from dolfin_tongue.scene.scene import Scene
 
 #: Demos and benchmarks stand beside the package in a checkout, each a file with a `main`.
 CHECKOUT = Path(__file__).resolve().parent.parent.parent
@@ -50,10 +52,14 @@ class Options:
         if self.dt is not None:
             require_positive(self, "s", dt=self.dt)
 
-    def steps(self, dt: float) -> TimeSteps | Implicit:
-        """Time steps of the chosen solver: of the size asked for, or else `dt` (s)."""
+    def method(self, dt: float) -> Method:
+        """Return the method of the chosen solver, with the step asked for, or else `dt` (s)."""
         chosen = self.dt if self.dt is not None else dt
-        return TimeSteps(chosen) if self.solver == "fenicsx" else Implicit(chosen)
+        if self.solver == "direct":
+            return TrBdf2(chosen)
+        from dolfin_tongue.fenicsx import GeneralisedAlpha  # loads UFL, DOLFINx and PETSc
+
+        return GeneralisedAlpha(chosen)
 
     def need_data(self) -> Path:
         """Folder of the published tongue; TongueError says how to name it."""
@@ -88,6 +94,42 @@ def load(name: str, kind: str = "demo") -> Callable[[Options], dict[str, Any]]:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.main
+
+
+def play(
+    scene: Scene,
+    end: float,
+    options: Options,
+    dt: float,
+    title: str,
+    *,
+    folder: Path | None = None,
+    method: Method | None = None,
+    frame_interval: float = 0.02,
+    draw: Callable[[Run, str], None] | None = picture_run,
+) -> Run:
+    """Simulate a scene under a progress bar and draw it.
+
+    Parameters
+    ----------
+    scene : what moves.
+    end : s.
+    options : of the demo.
+    dt : step of the demo, s, where none was asked for.
+    title : over the pictures.
+    folder : default that of the options.
+    method : default that of the options.
+    frame_interval : s.
+    draw : draws the run; None for nothing.
+    """
+    with progress_bar("simulated", end) as progress:
+        run = simulate(
+            scene, end, folder or options.folder, method or options.method(dt),
+            frame_interval=frame_interval, resume=options.resume, progress=progress,
+        )  # fmt: skip
+    if options.pictures and draw is not None:
+        draw(run, title)
+    return run
 
 
 @contextmanager

@@ -9,10 +9,8 @@ import numpy as np
 
 from dolfin_tongue import view
 from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.state import State
 from dolfin_tongue.boundary import Attached
-from dolfin_tongue.fenicsx.system import System
-from dolfin_tongue.march.state import State
-from dolfin_tongue.record.observe import contact_pressures
 from dolfin_tongue.record.run import Run
 from dolfin_tongue.view.plots import contact_names, rigid_names
 
@@ -38,7 +36,7 @@ def picture_run(run: Run, title: str) -> None:
     title : over the sheet.
     """
     body, folder = run.scene.body, run.folder
-    frames = view.telling_frames(run.frames, SHEET_FRAMES)
+    frames = view.key_frames(run.frames, SHEET_FRAMES)
     fixed = [r for s in run.scene.supports if isinstance(s, Attached) for r in s.regions]
     around = view.Surroundings.of(run.scene)
     view.contact_sheet(
@@ -65,9 +63,9 @@ def _picture_pressures(run: Run, title: str, steps: dict[str, np.ndarray]) -> No
         return
     begin = steps["time_s"][touched][0]
     frames = [frame for frame in run.frames if frame.time >= begin] or [run.last]
-    frames = view.telling_frames(frames, PRESSURE_FRAMES)
-    system = System(run.scene, dynamic=True)
-    maps = [np.sum(list(contact_pressures(system, x).values()), axis=0) for x in frames]
+    frames = view.key_frames(frames, PRESSURE_FRAMES)
+    touches = [run.solver.contacts(frame).values() for frame in frames]
+    maps = [np.sum([touch.pressure for touch in each], axis=0) for each in touches]
     view.contact_picture(run.scene.body, frames, maps, run.folder / "pressure.png", title=title)
 
 

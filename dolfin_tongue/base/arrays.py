@@ -5,11 +5,26 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from dolfin_tongue.base.errors import BadMesh
 
-FloatArray: TypeAlias = np.ndarray[Any, np.dtype[Any]]
-IntArray: TypeAlias = np.ndarray[Any, np.dtype[Any]]
+FloatArray: TypeAlias = npt.NDArray[np.floating[Any]]
+IntArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+
+
+def sums_at(places: IntArray, values: FloatArray, size: int = 0) -> FloatArray:
+    """Sum values by their places, shape (size,); faster than `np.add.at`.
+
+    Parameters
+    ----------
+    places : ndarray of any shape, >= 0.
+    values : ndarray of the same shape.
+    size : length of the result, at least.
+    """
+    total: Any = np.bincount(places.ravel(), values.ravel(), size)
+    return total
 
 
 def whole_numbers(what: str, value: Any) -> IntArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from math import isfinite
 from numbers import Real
 from typing import Any
@@ -59,18 +60,36 @@ class BadScene(TongueError, ValueError):
 
 
 class NoDirectForce(TongueError, NotImplementedError):
-    """A term that the direct solver does not implement.
+    """A term, or a law of one, that the direct solver does not implement.
 
     Parameters
     ----------
-    term : the term object that was refused.
+    term : the term or law that was refused.
     """
 
     def __init__(self, term: object):
         super().__init__(
-            f"the direct solver has no force for the term {type(term).__name__}; "
+            f"the direct solver has no force for {type(term).__name__}, whatever it derives from; "
             "remove it from the scene or use the FEniCSx solver"
         )
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Where a solver lost convergence.
+
+    Parameters
+    ----------
+    text : where, and what to try.
+    cells : the most distorted ones at the last accepted state.
+    smallest_ratio : smallest det F there.
+    largest_stretch : largest principal stretch there.
+    """
+
+    text: str
+    cells: tuple[int, ...] = ()
+    smallest_ratio: float = 1.0
+    largest_stretch: float = 1.0
 
 
 class NotConverged(TongueError, RuntimeError):
@@ -80,12 +99,13 @@ class NotConverged(TongueError, RuntimeError):
     ----------
     reason : PETSc's name of the reason, or the solver's own words.
     time : time reached, s (load factor in statics).
-    detail : where (cells) and what to try.
+    diagnosis : where, and what to try.
     """
 
-    def __init__(self, reason: str, time: float, detail: str):
-        self.reason, self.time = reason, time
-        super().__init__(f"no convergence beyond t = {time:.6g}: {reason}. {detail}")
+    def __init__(self, reason: str, time: float, diagnosis: Diagnosis | str):
+        found = Diagnosis(diagnosis) if isinstance(diagnosis, str) else diagnosis
+        self.reason, self.time, self.diagnosis = reason, time, found
+        super().__init__(f"no convergence beyond t = {time:.6g}: {reason}. {found.text}")
 
 
 def listing(items: Iterable[Any], limit: int = 20) -> str:
@@ -119,6 +139,13 @@ def require_not_negative(owner: object, unit: str, **numbers: Any) -> None:
     for name, value in numbers.items():
         if not (is_number(value) and value >= 0):
             raise OutOfRange(f"{type(owner).__name__}.{name}", value, "a finite number >= 0", unit)
+
+
+def require_vector(owner: object, name: str, value: Any) -> None:
+    """Raise OutOfRange unless the value has three finite components."""
+    parts = value.tolist() if isinstance(value, np.ndarray) else value
+    if not (isinstance(parts, tuple | list) and len(parts) == 3 and all(map(is_number, parts))):
+        raise OutOfRange(f"{type(owner).__name__}.{name}", value, "three finite numbers")
 
 
 def require_finite(owner: object, **numbers: Any) -> None:

@@ -7,3 +7,6 @@ cm3 = 1e-6
 ms = 1e-3
 kPa = 1e3
 gram = 1e-3
+
+#: Length beyond which coordinates are taken for millimetres, m.
+LARGEST_SIZE = 5.0

@@ -9,7 +9,7 @@ import numpy as np
 from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import BadScene
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.terms.term import Held
+from dolfin_tongue.terms.support import Held
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,11 @@ class Attached(Held):
     def label(self) -> str:
         """What messages call it."""
         return f"Attached({', '.join(self.regions)})"
+
+    @property
+    def moves(self) -> bool:
+        """No."""
+        return False
 
     def nodes(self, body: Body) -> IntArray:
         """Nodes of all regions, each once."""

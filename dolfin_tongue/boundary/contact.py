@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray
 from dolfin_tongue.base.errors import BadScene, OutOfRange, is_number, listing, require_positive
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.body.faces import BOUNDARY
+from dolfin_tongue.body.faces import BOUNDARY, corners_of
+from dolfin_tongue.control import Timed
 from dolfin_tongue.control.motion import Motion, check_motion
 from dolfin_tongue.surfaces.base import Gap, Surface
-from dolfin_tongue.terms.kinematics import Expr, Kinematics
-from dolfin_tongue.terms.term import Fields, Term
+from dolfin_tongue.terms.term import Term
 
 
 class ContactLaw(ABC):
@@ -23,8 +24,9 @@ class ContactLaw(ABC):
 
     #: Gap at and beyond which the traction vanishes, m.
     range: float
-    #: Whether the traction depends on the rate of the gap; one that does not derives from `energy`.
-    rated: ClassVar[bool]
+    #: Whether the traction depends on the rate of the gap. One that does not derives from `energy`,
+    #: and is stated at the end of a step.
+    rate_dependent: ClassVar[bool] = False
 
     @abstractmethod
     def traction(
@@ -35,11 +37,11 @@ class ContactLaw(ABC):
         Parameters
         ----------
         gap : ndarray, shape (k,), m.
-        rate : ndarray, shape (k,), m/s -- (59); None for a law that is not `rated`.
+        rate : ndarray, shape (k,), m/s -- (59); None for a law that is not `rate_dependent`.
         """
 
     def energy(self, gap: FloatArray) -> FloatArray:
-        """Energy per reference area, J/m2, with t = -d(energy)/d(gap); zero for a rated law."""
+        """Energy per reference area, J/m2, with t = -d(energy)/d(gap); zero for a law of rates."""
         return np.zeros_like(gap)
 
 
@@ -58,7 +60,6 @@ class Barrier(ContactLaw):
     steep : see above, > 2.
     """
 
-    rated: ClassVar[bool] = False
     range: float = 2e-4
     pressure: float = 1e3
     steep: float = 50.0
@@ -103,7 +104,7 @@ class ReportContact(ContactLaw):
     range : h_eps, m, > 0.
     """
 
-    rated: ClassVar[bool] = True
+    rate_dependent: ClassVar[bool] = True
     a1: float = 1e8
     a2: float = 1.0
     a3: float = 1.0
@@ -129,7 +130,7 @@ class ReportContact(ContactLaw):
         return near * speed, by_gap, by_rate
 
 
-def in_front(gap: Gap, behind: FloatArray) -> Gap:
+def in_front(gap: Gap, behind: BoolArray) -> Gap:
     """Gap without the points that were behind a sheet before and still are; inf for them.
 
     A point that comes up behind a rim is all at once deep in the wall by its signed distance.
@@ -176,10 +177,13 @@ class Contact(Term):
             raise BadScene(f"Contact.surface must be the name of one, not {self.surface!r}")
         if not isinstance(self.law, ContactLaw):
             raise BadScene(f"Contact.law must be a law such as Barrier(), not {self.law!r}")
+        if not (is_number(getattr(self.law, "range", None)) and self.law.range > 0):
+            raise BadScene(
+                f"{type(self.law).__name__}.range must be the gap (m, > 0) beyond which there is "
+                "no traction"
+            )
         if self.motion is not None and not (
-            isinstance(self.motion, tuple)
-            and len(self.motion) == 3
-            and all(isinstance(part, Motion) for part in self.motion)
+            isinstance(self.motion, tuple) and len(self.motion) == 3
         ):
             raise BadScene(
                 "Contact.motion must be three motions for x, y, z, e.g. "
@@ -190,7 +194,7 @@ class Contact(Term):
 
     def check(self, body: Body) -> None:
         """Refuse an unknown surface, and points of it that start behind the obstacle."""
-        corners = body.points[body.surface(self.surface)]
+        corners = body.points[corners_of(body.surface(self.surface))]
         edges = (corners + np.roll(corners, 1, axis=1)) / 2
         points = np.concatenate([*corners, *edges, corners.mean(axis=1)])
         points = np.unique(points, axis=0)
@@ -218,10 +222,6 @@ class Contact(Term):
         return parts[:, 0], parts[:, 1]
 
     @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Those of the obstacle's motion, s."""
-        return tuple(t for part in self.motion or () for t in part.breakpoints)
-
-    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> None:
-        """No form: the gap is no UFL expression; see `coupling.contact`."""
-        return None
+    def parts(self) -> Mapping[str, Timed]:
+        """The obstacle's motion."""
+        return dict(zip("xyz", self.motion or (), strict=False))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-import ufl
+from dolfin_tongue.base.errors import require_vector
+from dolfin_tongue.terms.term import EnergyTerm, Expr, Fields
 
-from dolfin_tongue.terms.kinematics import Expr, Kinematics
-from dolfin_tongue.terms.term import EnergyTerm, Fields, require_vector
+if TYPE_CHECKING:  # UFL
+    from dolfin_tongue.terms.kinematics import Kinematics
 
 #: Standard gravity, m/s2.
 STANDARD_GRAVITY = 9.81
@@ -16,7 +17,7 @@ STANDARD_GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Gravity(EnergyTerm):
-    """Uniform gravity; energy density -rho_0 g.u.
+    """Uniform gravity; energy density -rho_0 g.u, force B = rho_0 g (38).
 
     Parameters
     ----------
@@ -29,15 +30,10 @@ class Gravity(EnergyTerm):
     def __post_init__(self) -> None:
         require_vector(self, "acceleration", self.acceleration)
 
-    def force_density(self, kin: Kinematics, fields: Fields) -> Expr:
-        """B = rho_0 g, N/m3."""
-        weight = [kin.number(fields.body.density * component) for component in self.acceleration]
-        return kin.loaded(ufl.as_vector(weight))
-
     def energy_density(self, kin: Kinematics, fields: Fields) -> Expr:
         """-rho_0 g.u, J/m3, zero in the reference configuration."""
-        return -ufl.inner(self.force_density(kin, fields), kin.displacement)
+        import ufl
 
-    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form:
-        """Integral of -B.w (38)."""
-        return -ufl.inner(self.force_density(kin, fields), test) * kin.dx
+        density = fields.value(fields.body.density, "density")
+        pull = ufl.as_vector([kin.number(component) for component in self.acceleration])
+        return -kin.loaded(density * ufl.inner(pull, kin.displacement))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
-from dolfin_tongue.base.errors import require_positive
+from dolfin_tongue.base.values import Value, require_positive_values
 from dolfin_tongue.body.faces import BOUNDARY
-from dolfin_tongue.terms.kinematics import Expr, Kinematics
-from dolfin_tongue.terms.term import Fields, SurfaceTerm
+from dolfin_tongue.terms.term import Expr, Fields, SurfaceTerm
+
+if TYPE_CHECKING:  # UFL
+    from dolfin_tongue.terms.kinematics import SurfaceKinematics
 
 
 @dataclass(frozen=True)
@@ -35,15 +38,16 @@ class Skin(SurfaceTerm):
     OutOfRange : a number that is not positive.
     """
 
-    shear_modulus: float
-    thickness: float
+    numbers: ClassVar[tuple[str, ...]] = ("shear_modulus", "thickness")
+    shear_modulus: Value
+    thickness: Value
     surface: str = BOUNDARY
 
     def __post_init__(self) -> None:
-        require_positive(self, "Pa", shear_modulus=self.shear_modulus)
-        require_positive(self, "m", thickness=self.thickness)
+        require_positive_values(self, "Pa", shear_modulus=self.shear_modulus)
+        require_positive_values(self, "m", thickness=self.thickness)
 
-    def energy_density(self, kin: Kinematics, fields: Fields) -> Expr:
+    def energy_density(self, kin: SurfaceKinematics, fields: Fields) -> Expr:
         """Energy mu h / 2 (tr C_s + 1 / det C_s - 3) per reference area, J/m2."""
-        scale = kin.number(self.shear_modulus * self.thickness / 2)
+        scale = fields.value(self.shear_modulus) * fields.value(self.thickness) / 2
         return scale * (kin.surface_C_trace + 1 / kin.area_ratio**2 - 3)

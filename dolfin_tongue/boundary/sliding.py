@@ -10,7 +10,7 @@ from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import BadScene, listing
 from dolfin_tongue.body.body import Body
 from dolfin_tongue.surfaces.base import Surface
-from dolfin_tongue.terms.term import Support
+from dolfin_tongue.terms.support import Support
 
 #: Largest distance from the surface at which a reference node counts as on it, m.
 ON_SURFACE = 1e-9

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
-from dolfin_tongue.base.errors import require_positive
+from dolfin_tongue.base.values import Value, require_positive_values
 from dolfin_tongue.body.faces import BOUNDARY
-from dolfin_tongue.terms.kinematics import Expr, Kinematics
-from dolfin_tongue.terms.term import Fields, SurfaceTerm
+from dolfin_tongue.terms.term import Expr, Fields, SurfaceTerm
+
+if TYPE_CHECKING:  # UFL
+    from dolfin_tongue.terms.kinematics import SurfaceKinematics
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,13 @@ class SurfaceTension(SurfaceTerm):
     OutOfRange : sigma <= 0.
     """
 
-    sigma: float
+    numbers: ClassVar[tuple[str, ...]] = ("sigma",)
+    sigma: Value
     surface: str = BOUNDARY
 
     def __post_init__(self) -> None:
-        require_positive(self, "N/m", sigma=self.sigma)
+        require_positive_values(self, "N/m", sigma=self.sigma)
 
-    def energy_density(self, kin: Kinematics, fields: Fields) -> Expr:
+    def energy_density(self, kin: SurfaceKinematics, fields: Fields) -> Expr:
         """Sigma |J F^-T N| per reference area, J/m2 (2), (11)."""
-        return kin.loaded(kin.number(self.sigma)) * kin.area_ratio
+        return kin.loaded(fields.value(self.sigma)) * kin.area_ratio

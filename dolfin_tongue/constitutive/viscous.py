@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
-import ufl
+from dolfin_tongue.base.values import Value, require_positive_values
+from dolfin_tongue.terms.term import Expr, Fields, StressTerm
 
-from dolfin_tongue.base.errors import require_positive
-from dolfin_tongue.terms.kinematics import Expr, Kinematics
-from dolfin_tongue.terms.term import Fields, Term
+if TYPE_CHECKING:  # UFL
+    from dolfin_tongue.terms.kinematics import Kinematics
 
 
 @dataclass(frozen=True)
-class Viscosity(Term):
+class Viscosity(StressTerm):
     """Newtonian stress T = 2 eta dev(D), parallel to the passive tissue.
 
     Parameters
@@ -21,14 +22,16 @@ class Viscosity(Term):
         shear modulus of 2.07 kPa is 62 Pa s.
     """
 
-    eta: float
+    numbers: ClassVar[tuple[str, ...]] = ("eta",)
+    eta: Value
 
     def __post_init__(self) -> None:
-        require_positive(self, "Pa s", eta=self.eta)
+        require_positive_values(self, "Pa s", eta=self.eta)
 
-    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form | None:
-        """Integral of P : grad w with P = 2 eta J dev(D) F^-T; None in a static scene."""
+    def first_piola(self, kin: Kinematics, fields: Fields) -> Expr | None:
+        """P = 2 eta J dev(D) F^-T, Pa; None in a static scene."""
+        import ufl
+
         if kin.static:
             return None
-        stress = 2 * kin.number(self.eta) * kin.J * ufl.dev(kin.D)
-        return kin.power(stress * ufl.inv(kin.F).T, test)
+        return 2 * fields.value(self.eta) * kin.J * ufl.dev(kin.D) * ufl.inv(kin.F).T

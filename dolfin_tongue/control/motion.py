@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, pi, sin
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from dolfin_tongue.base.errors import BadScene, require_finite, require_positive
+from dolfin_tongue.control.timed import Timed
 
 
-@runtime_checkable
-class Motion(Protocol):
-    """A coordinate (m or rad) over time, with continuous velocity."""
+class Motion(Timed, ABC):
+    """A coordinate (m or rad) over time, with continuous velocity.
 
+    Break points are times at which the acceleration is not smooth, jumps those at which it jumps.
+    """
+
+    @abstractmethod
     def at(self, time: float) -> tuple[float, float, float]:
         """Value, rate and acceleration at a time (s)."""
 
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Times (s) at which the acceleration is not smooth."""
-
 
 def check_motion(what: str, motion: Any) -> None:
-    """Raise BadScene unless something that looks like a motion gives finite numbers at t = 0."""
+    """Raise BadScene unless something is a motion and gives finite numbers at t = 0."""
     if isinstance(motion, type):
         raise BadScene(f"{what} is the class {motion.__name__}; make one, e.g. SmoothMove(0.01)")
+    if not isinstance(motion, Motion):
+        raise BadScene(
+            f"{what} must be a motion, e.g. Still(), SmoothMove(0.01) or a class of your own that "
+            f"derives from Motion, not {motion!r}"
+        )
     try:
         found = np.asarray(motion.at(0.0), dtype=float)
         times = np.asarray(motion.breakpoints, dtype=float)
@@ -44,7 +50,7 @@ def check_motion(what: str, motion: Any) -> None:
 
 
 @dataclass(frozen=True)
-class Still:
+class Still(Motion):
     """No motion.
 
     Parameters
@@ -61,11 +67,9 @@ class Still:
         """Value, rate, acceleration."""
         return self.value, 0.0, 0.0
 
-    breakpoints: tuple[float, ...] = ()
-
 
 @dataclass(frozen=True)
-class SmoothMove:
+class SmoothMove(Motion):
     """A move of minimum jerk (Flash and Hogan 1985): 10 s^3 - 15 s^4 + 6 s^5.
 
     Parameters
@@ -99,7 +103,7 @@ class SmoothMove:
 
 
 @dataclass(frozen=True)
-class Swing:
+class Swing(Motion):
     """Harmonic motion A (1 - cos(2 pi f t)) / 2, which starts from rest.
 
     Parameters
@@ -121,11 +125,9 @@ class Swing:
         phase = omega * time
         return half * (1 - cos(phase)), half * omega * sin(phase), half * omega**2 * cos(phase)
 
-    breakpoints: tuple[float, ...] = ()
-
 
 @dataclass(frozen=True)
-class Recorded:
+class Recorded(Motion):
     """Recorded positions, interpolated by a cubic spline that rests at both ends.
 
     Parameters
@@ -167,7 +169,8 @@ class Recorded:
         """Value, rate, acceleration."""
         if not self.times[0] <= time <= self.times[-1]:
             return (self.values[0] if time < self.times[0] else self.values[-1]), 0.0, 0.0
-        return tuple(float(self._spline(time, order)) for order in range(3))  # type: ignore[return-value]
+        value, rate, acceleration = (float(self._spline(time, order)) for order in range(3))
+        return value, rate, acceleration
 
     @property
     def breakpoints(self) -> tuple[float, ...]:

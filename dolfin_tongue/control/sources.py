@@ -2,28 +2,50 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from dolfin_tongue.base.errors import BadScene, OutOfRange, is_number
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.state import State
+from dolfin_tongue.control.timed import Instant, Memory, Timed
 
 
-@runtime_checkable
-class Control(Protocol):
-    """A number over time, with the times at which it is not smooth."""
+class Control(Timed, ABC):
+    """A number over time."""
 
+    @abstractmethod
     def __call__(self, time: float) -> float:
         """Value at a time (s); at a jump the value after it."""
 
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Times (s) of kinks and jumps."""
+    def at(self, now: Instant) -> float:
+        """Value at an instant."""
+        return self(now.time)
 
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Times (s) of jumps."""
+
+class RememberingControl(Control):
+    """A number that depends on the motion so far: a filter of another control, a reflex.
+
+    A subclass states `begin`, `advance` and `at`; see `control.timed`.
+    """
+
+    @abstractmethod
+    def begin(self, body: Body, state: State) -> Memory:
+        """Memory at the beginning of a motion."""
+
+    @abstractmethod
+    def advance(self, memory: Memory, body: Body, first: State, last: State) -> Memory:
+        """Memory after a step that has been accepted; a new one."""
+
+    @abstractmethod
+    def at(self, now: Instant) -> float:
+        """Value at an instant, from its memory; smooth in time until the next step."""
+
+    def __call__(self, time: float) -> float:
+        """Refuse: a time alone does not say."""
+        raise BadScene(f"{type(self).__name__} depends on the motion so far, not on time alone")
 
 
 def require_activation(value: float, what: str = "activation") -> None:
@@ -39,7 +61,7 @@ def require_time(value: float, what: str) -> None:
 
 
 @dataclass(frozen=True)
-class Constant:
+class Constant(Control):
     """The same activation at all times.
 
     Parameters
@@ -56,12 +78,9 @@ class Constant:
         """Activation at any time."""
         return self.level
 
-    breakpoints: tuple[float, ...] = ()
-    jumps: tuple[float, ...] = ()
-
 
 @dataclass(frozen=True)
-class Step:
+class Step(Control):
     """Activation that jumps from 0 to a level.
 
     Parameters
@@ -86,11 +105,14 @@ class Step:
         """The jump, s."""
         return (self.start,)
 
-    jumps = breakpoints
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """The jump, s."""
+        return (self.start,)
 
 
 @dataclass(frozen=True)
-class Ramp:
+class Ramp(Control):
     """Activation that rises linearly from 0 to a level and stays there.
 
     Parameters
@@ -119,8 +141,6 @@ class Ramp:
         """Begin and end of the rise, s."""
         return (self.start, self.start + self.duration)
 
-    jumps: tuple[float, ...] = ()
-
 
 @dataclass(frozen=True)
 class SmoothRamp(Ramp):
@@ -140,7 +160,7 @@ class SmoothRamp(Ramp):
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(Control):
     """Activation interpolated linearly between knots, constant outside.
 
     Parameters
@@ -185,5 +205,3 @@ class Table:
         slopes = np.concatenate([[0.0], slopes, [0.0]])
         kinks = ~np.isclose(slopes[1:], slopes[:-1], rtol=1e-9, atol=1e-9)
         return tuple(float(t) for t in np.asarray(self.times)[kinks])
-
-    jumps: tuple[float, ...] = ()

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.body.state import State
 from dolfin_tongue.direct.model import Model
-from dolfin_tongue.march.state import State
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,10 @@ def momentum(model: Model, state: State) -> tuple[FloatArray, FloatArray]:
     Of the tissue and the rigid bodies.
     """
     nodal = model.mass @ state.velocity
-    position = model.mesh.points + state.displacement
+    position = model.body.points + state.displacement
     linear, angular = nodal.sum(axis=0), np.cross(position, nodal).sum(axis=0)
-    if model.bodies is not None:
-        own = model.bodies.momentum(state.rigid, state.rigid_rate)
-        linear, angular = linear + own[0], angular + own[1]
-    return linear, angular
+    own = model.bodies.momentum(state.rigid, state.rigid_rate)
+    return linear + own[0], angular + own[1]
 
 
 def drift(model: Model, states: Iterable[State]) -> Drift:
@@ -47,13 +45,11 @@ def drift(model: Model, states: Iterable[State]) -> Drift:
     states = list(states)
     nodal = np.array([np.linalg.norm(model.mass @ s.velocity, axis=1) for s in states])
     mass = np.asarray(model.mass.sum(axis=1)).ravel()
-    lever = np.linalg.norm(model.mesh.points - mass @ model.mesh.points / mass.sum(), axis=1)
+    lever = np.linalg.norm(model.body.points - mass @ model.body.points / mass.sum(), axis=1)
     kinetic = max(0.5 * float(np.sum(s.velocity * (model.mass @ s.velocity))) for s in states)
     pairs = [momentum(model, s) for s in states]
     linear, angular = (np.array(part) for part in zip(*pairs, strict=True))
-    energy = np.array(
-        [model.energy(s.displacement, s.velocity, s.rigid, s.rigid_rate, s.time) for s in states]
-    )
+    energy = np.array([model.energy(state) for state in states])
     return Drift(
         float(np.linalg.norm(linear - linear[0], axis=1).max() / nodal.sum(axis=1).max()),
         float(np.linalg.norm(angular - angular[0], axis=1).max() / (nodal @ lever).max()),

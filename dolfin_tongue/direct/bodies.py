@@ -17,36 +17,99 @@ point there. Prescribed coordinates have no equation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray, IntArray, sums_at
+from dolfin_tongue.control import Instant
 from dolfin_tongue.rigid import plane
 from dolfin_tongue.rigid.body import RigidBody
 from dolfin_tongue.rigid.loads import Loads
+from dolfin_tongue.scene.scene import Scene
 
 
-class Bodies:
-    """The rigid bodies of a problem.
+class NoBodies:
+    """The rigid bodies of a scene that has none: no rows, no unknowns, no work.
 
     Parameters
     ----------
-    bodies : the rigid bodies.
-    attached : numbers of the nodes of each.
-    points : reference positions of all nodes, m.
-    gravity : m/s2, shape (3,).
+    count : number of nodes.
+
+    Attributes
+    ----------
+    loads : of the bodies, where there are any.
     """
 
-    def __init__(
-        self,
-        bodies: Sequence[RigidBody],
-        attached: Sequence[IntArray],
-        points: FloatArray,
-        gravity: FloatArray,
-    ):
+    loads: Loads
+
+    def __init__(self, count: int):
+        nobody: IntArray = np.zeros(0, dtype=np.int64)
+        nothing: FloatArray = np.zeros(0)
+        self.bodies: tuple[RigidBody, ...] = ()
+        self.attached, self.rows, self.unknown = nobody, nobody, nobody
+        self.is_centre: BoolArray = np.zeros(0, dtype=bool)
+        self.centres = self.coordinates = slice(count, count)
+        self.given: BoolArray = np.zeros((0, 3), dtype=bool)
+        self.inertia, self.masses = nothing, nothing
+
+    def place(self, time: float, u: FloatArray, v: FloatArray | None = None) -> None:
+        """Write nothing."""
+
+    def given_acceleration(
+        self, time: float, u: FloatArray, v: FloatArray, out: FloatArray
+    ) -> None:
+        """Write nothing."""
+
+    def columns(self, u: FloatArray, turn: FloatArray | None = None) -> FloatArray:
+        """Return no columns."""
+        return np.zeros((0, 3, 0))
+
+    def forces(self, u: FloatArray, force: FloatArray) -> FloatArray:
+        """Return no forces."""
+        return np.zeros((0, 3))
+
+    def residual(
+        self, now: Instant, u: FloatArray, v: FloatArray, a: FloatArray, force: FloatArray
+    ) -> FloatArray:
+        """Return no rows."""
+        return np.zeros(0)
+
+    def tangents(
+        self, now: Instant, u: FloatArray, v: FloatArray, force: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return nothing."""
+        return np.zeros((0, 0)), np.zeros((0, 0))
+
+    def energies(self, now: Instant, u: FloatArray, v: FloatArray) -> dict[str, float]:
+        """Return none."""
+        return {}
+
+    def powers(self, now: Instant, u: FloatArray, v: FloatArray) -> dict[str, float]:
+        """Return none."""
+        return {}
+
+    def weight_energy(self, rigid: FloatArray) -> float:
+        """Return 0."""
+        return 0.0
+
+    def momentum(self, rigid: FloatArray, rate: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return zeros."""
+        return np.zeros(3), np.zeros(3)
+
+
+class Bodies(NoBodies):
+    """The rigid bodies of a scene.
+
+    Parameters
+    ----------
+    scene : with rigid bodies.
+    """
+
+    def __init__(self, scene: Scene):
+        bodies, points, gravity = scene.rigid_bodies, scene.body.points, scene.gravity
+        attached = [body.nodes(scene.body) for body in bodies]
         count, number = len(points), len(bodies)
-        self.bodies, self.loads = tuple(bodies), Loads(bodies, gravity)
+        super().__init__(count)
+        self.bodies, self.loads = bodies, Loads(bodies, gravity)
         self.attached = np.concatenate([*attached, []]).astype(np.int64)
         rows = [np.append(nodes, count + i) for i, nodes in enumerate(attached)]
         self._owner = np.repeat(np.arange(number), [len(part) for part in rows])
@@ -73,7 +136,7 @@ class Bodies:
 
     # -- kinematics ----------------------------------------------------------------------------
 
-    def _turned(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _geometry(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Arms (k, 3), T over all coordinates (3k, 3b), and d2u/dangle2 (k, 3), at given angles."""
         angles = u[self.coordinates, 2]
         key = angles.tobytes()
@@ -95,7 +158,7 @@ class Bodies:
             q[self.given] = value[:, 0][self.given]
             if rate is not None:
                 rate[self.given] = value[:, 1][self.given]
-        arms, T, _ = self._turned(u)
+        arms, T, _ = self._geometry(u)
         moved = arms - self._arms
         moved[:, 0] += q[self._owner, 0]
         moved[:, 2] += q[self._owner, 1]
@@ -107,7 +170,7 @@ class Bodies:
         self, time: float, u: FloatArray, v: FloatArray, out: FloatArray
     ) -> None:
         """Write the accelerations that are left when the unknown ones are zero."""
-        _, T, bend = self._turned(u)
+        _, T, bend = self._geometry(u)
         turn = v[self.coordinates, 2] ** 2
         acceleration = bend * turn[self._owner][:, None]
         if self._any_given:
@@ -125,7 +188,7 @@ class Bodies:
         turn : angle that each body turns by while its rate is varied, shape (b,), rad: the rate in
             a stage changes the position too, by d h, so that T turns by d h angle'. Default none.
         """
-        _, T, bend = self._turned(u)
+        _, T, bend = self._geometry(u)
         T = T.reshape(len(bend), 3, -1)
         if turn is not None:
             T = T.copy()
@@ -135,26 +198,26 @@ class Bodies:
 
     def forces(self, u: FloatArray, force: FloatArray) -> FloatArray:
         """sum_k T_k^T f_k on all coordinates, shape (b, 3), from forces on all rows."""
-        return (force[self.rows].ravel() @ self._turned(u)[1]).reshape(-1, 3)
+        return (force[self.rows].ravel() @ self._geometry(u)[1]).reshape(-1, 3)
 
     # -- equations -----------------------------------------------------------------------------
 
     def residual(
-        self, time: float, u: FloatArray, v: FloatArray, a: FloatArray, force: FloatArray
+        self, now: Instant, u: FloatArray, v: FloatArray, a: FloatArray, force: FloatArray
     ) -> FloatArray:
         """All that acts on the unknown coordinates, minus their inertia, shape (r,), N and N m.
 
         Parameters
         ----------
-        time, u, v, a : the motion, with all rows.
+        now, u, v, a : the motion, with all rows.
         force : forces minus inertia of all rows.
         """
         at, unknown = self.coordinates, self.unknown
         total = self.forces(u, force).ravel() - self.inertia * a[at].ravel()
-        return (total + self.loads.force(time, u[at].ravel(), v[at].ravel()))[unknown]
+        return (total + self.loads.force(now, u[at].ravel(), v[at].ravel()))[unknown]
 
     def tangents(
-        self, time: float, u: FloatArray, v: FloatArray, force: FloatArray
+        self, now: Instant, u: FloatArray, v: FloatArray, force: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Stiffness and damping of the unknown coordinates beside those of the nodal forces.
 
@@ -166,19 +229,30 @@ class Bodies:
         forces held.
         """
         at = self.coordinates
-        by_q, by_v = self.loads.force_tangents(time, u[at].ravel(), v[at].ravel())
-        bent = np.sum(self._turned(u)[2] * force[self.rows], axis=1)
+        by_q, by_v = self.loads.force_tangents(now, u[at].ravel(), v[at].ravel())
+        bent = np.sum(self._geometry(u)[2] * force[self.rows], axis=1)
         angles = 3 * np.arange(len(self.bodies)) + 2
-        by_q[angles, angles] += np.bincount(self._owner, bent)
+        by_q[angles, angles] += sums_at(self._owner, bent)
         pick = np.ix_(self.unknown, self.unknown)
         return -by_q[pick], -by_v[pick]
 
     # -- balances ------------------------------------------------------------------------------
 
-    def energy(self, rigid: FloatArray, rate: FloatArray) -> float:
-        """Kinetic energy and energy of the weights, J."""
-        total = self.loads.kinetic_energy(rigid.ravel(), rate.ravel())
-        for body, q in zip(self.bodies, rigid, strict=True):
+    def energies(self, now: Instant, u: FloatArray, v: FloatArray) -> dict[str, float]:
+        """Kinetic energy, J."""
+        q, rate = u[self.coordinates].ravel(), v[self.coordinates].ravel()
+        return {"kinetic_rigid": self.loads.kinetic_energy(q, rate)}
+
+    def powers(self, now: Instant, u: FloatArray, v: FloatArray) -> dict[str, float]:
+        """Power of their forces, weight included, W."""
+        q, rate = u[self.coordinates].ravel(), v[self.coordinates].ravel()
+        return {"rigid_forces": float(rate @ self.loads.force(now, q, rate))}
+
+    def weight_energy(self, rigid: FloatArray) -> float:
+        """Energy of the weights, J."""
+        total = 0.0
+        for number, body in enumerate(self.bodies):
+            q = rigid[number]
             arm = body.arms(np.asarray(body.centre))
             total -= body.mass * float(plane.displacement(arm, q)[0] @ self._gravity)
         return total
@@ -186,7 +260,8 @@ class Bodies:
     def momentum(self, rigid: FloatArray, rate: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Momentum, N s, and angular momentum about the origin, N m s; each of shape (3,)."""
         linear, angular = np.zeros((2, 3))
-        for body, q, v in zip(self.bodies, rigid, rate, strict=True):
+        for number, body in enumerate(self.bodies):
+            q, v = rigid[number], rate[number]
             arm = body.arms(np.asarray(body.centre))
             place = np.asarray(body.centre) + plane.displacement(arm, q)[0]
             own = body.mass * plane.jacobian(arm, q)[0] @ v

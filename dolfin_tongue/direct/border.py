@@ -33,15 +33,14 @@ class MassBorder:
 
     def __init__(self, model: Model, solve: Callable[[FloatArray], FloatArray]):
         bodies = model.bodies
-        assert bodies is not None
-        mass, self._nodes = model.whole_mass, len(model.free)
-        self._coupling = mass[bodies.rows][:, model.free]  # (k, f)
+        mass, self._nodes = model.whole_mass, len(model.numbering.free)
+        self._coupling = mass[bodies.rows][:, model.numbering.free]  # (k, f)
         self._spread = solve(self._coupling.T.toarray())  # (f, k)
         at_points = mass[bodies.rows][:, bodies.rows].toarray()
         self._reduced = at_points - self._coupling @ self._spread
         self._inertia = np.diag(bodies.inertia[bodies.unknown])
 
-    def turn(self, columns: FloatArray) -> None:
+    def update_geometry(self, columns: FloatArray) -> None:
         """Take the position of the bodies from their `Bodies.columns`."""
         points, _, count = columns.shape
         self._columns = columns.reshape(-1, count)
@@ -105,11 +104,15 @@ def condensed(
     matrices : element matrices (m, 3k, 3k).
     columns, rows : P and Q, see `Bodies.columns`.
     """
-    count, free = columns.shape[2], 3 * len(model.free)
+    count, free = columns.shape[2], 3 * len(model.numbering.free)
     C, R, E = np.zeros((free, count)), np.zeros((free, count)), np.zeros((count, count))
     fields = [_field(model, part) for part in (columns, rows)]
     for block, dofs, part, near in zip(
-        model.blocks, model.block_dofs, matrices, model.near_bodies, strict=False
+        model.body.blocks,
+        model.numbering.part_dofs,
+        matrices,
+        model.numbering.near_bodies,
+        strict=False,
     ):
         P, Q = (
             field[block.cells[near]].transpose(0, 2, 1, 3).reshape(len(near), part.shape[1], count)
@@ -129,8 +132,10 @@ def condensed_gradient(
 ) -> FloatArray:
     """G_a P: constraints by the unknown coordinates, shape (c, r)."""
     field = _field(model, columns)
-    out = np.zeros((model.constraint_count, columns.shape[2]))
-    for block, gradient, near in zip(model.blocks, gradients, model.near_bodies, strict=False):
+    out = np.zeros((model.constraints.count, columns.shape[2]))
+    for block, gradient, near in zip(
+        model.body.blocks, gradients, model.numbering.near_bodies, strict=False
+    ):
         numbers = block.numbers.start + near
         out[numbers] = np.einsum("mki,mkir->mr", gradient[near], field[block.cells[near]])
     return out
@@ -138,7 +143,6 @@ def condensed_gradient(
 
 def _field(model: Model, columns: FloatArray) -> FloatArray:
     """Columns spread over all rows, zero elsewhere."""
-    assert model.bodies is not None
-    field = np.zeros((*model.shape, columns.shape[2]))
+    field = np.zeros((*model.numbering.shape, columns.shape[2]))
     field[model.bodies.rows] = columns
     return field

@@ -16,62 +16,48 @@ An obstacle that nothing comes near costs an interpolation of positions: see `Ob
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
 from itertools import pairwise
 
 import numpy as np
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray, IntArray
 from dolfin_tongue.base.compiled import compiled
+from dolfin_tongue.body.face_groups import FaceGroup
+from dolfin_tongue.body.state import NOTHING
 from dolfin_tongue.boundary.contact import Contact, in_front
-from dolfin_tongue.direct.faces import FaceGroup
+from dolfin_tongue.control import Instant
 from dolfin_tongue.direct.membranes import base_vectors, determinant
+from dolfin_tongue.direct.parts import Configuration, Part, chosen
+from dolfin_tongue.march.observed import Touch
 from dolfin_tongue.surfaces.base import Gap
-
-
-@dataclass(frozen=True, eq=False)
-class Touch:
-    """What a contact does at one instant.
-
-    Parameters
-    ----------
-    area : reference area of the points nearer than the range of the law, m2.
-    resultant : ndarray, shape (3,) -- force on the tissue, N.
-    traction : the largest, Pa.
-    gap : the smallest, m; inf where the obstacle does not reach.
-    """
-
-    area: float
-    resultant: FloatArray
-    traction: float
-    gap: float
-
 
 #: No points, and their gaps.
 NOWHERE = (np.zeros(0, np.int64), Gap(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3))))
 
 
-class Obstacle:
+class Obstacle(Part):
     """One `Contact` on its faces.
 
     Parameters
     ----------
+    label : of the term.
     term : obstacle, law and motion.
     groups : the faces, with k points in all.
     points : ndarray, shape (n, 3), m -- reference positions.
     """
 
-    def __init__(self, term: Contact, groups: list[FaceGroup], points: FloatArray):
+    def __init__(self, label: str, term: Contact, groups: list[FaceGroup], points: FloatArray):
         groups = [group.for_contact() for group in groups]
-        self.term, self.groups, self.rated = term, groups, term.law.rated
+        self.labels, self.term, self.groups = (label,), term, groups
+        self.rate_dependent, self.has_sides = term.law.rate_dependent, term.obstacle.has_rim
         self.points = points
-        self._clear = -1.0
+        self._clear, self._clear_memory = -1.0, NOTHING
         self.areas = np.concatenate([_areas(group, points) for group in groups])
         #: Per group: its points among all.
         ends = np.cumsum([0, *(len(group.faces) * len(group.kind.weights) for group in groups)])
         self.slices = [slice(a, b) for a, b in pairwise(ends)]
-        self._seen = np.zeros((len(self.areas), 3))
-        self._behind = np.zeros(len(self.areas), dtype=np.bool_)
+        self._seen: FloatArray = np.zeros((len(self.areas), 3))
 
     @property
     def name(self) -> str:
@@ -80,8 +66,8 @@ class Obstacle:
 
     @property
     def impassable(self) -> bool:
-        """Whether the law stops a body for good: one with an energy; a rated one lets it creep."""
-        return not self.rated
+        """Whether the law stops a body for good: one with an energy; one of rates lets it creep."""
+        return not self.rate_dependent
 
     def at_points(self, values: FloatArray) -> FloatArray:
         """Values at the points from those at nodes, shape (n, 3); shape (k, 3)."""
@@ -90,53 +76,59 @@ class Obstacle:
             interpolate(values, group.faces, group.kind.shapes, out[part])
         return out
 
-    def begin(self, time: float, x: FloatArray) -> None:
-        """Note which points are behind a sheet, or beyond its reach, where a step begins."""
-        if self.term.obstacle.has_rim:
-            distance = self.term.obstacle.gap(self._places(time, x)).distance
-            self._behind = ~((distance > 0) & np.isfinite(distance))
+    def sides(self, time: float, x: FloatArray) -> BoolArray:
+        """Which points are behind a sheet, or beyond its reach, where a step begins."""
+        distance = self.term.obstacle.gap(self._places(time, x)).distance
+        return ~((distance > 0) & np.isfinite(distance))
 
     def _places(self, time: float, x: FloatArray) -> FloatArray:
         """Positions of the points against the obstacle for nodes at x, shape (n, 3), m."""
         return self.at_points(x) - self.term.shift(time)[0]
 
-    def _near(self, time: float, x: FloatArray) -> tuple[IntArray, Gap]:
+    def _gap(self, now: Instant, places: FloatArray) -> Gap:
+        gap = self.term.obstacle.gap(places)
+        behind = now.of("sides").memory.get(self.labels[0]) if self.has_sides else None
+        return gap if behind is None else in_front(gap, behind)
+
+    def _near(self, now: Instant, x: FloatArray) -> tuple[IntArray, Gap]:
         """Points nearer than the range, with their gaps.
 
         A distance changes by no more than the point moves: while no point has moved by as much as
         was clear when the gaps were last asked for, they need not be asked for.
         """
-        places = self._places(time, x)
-        if farthest(places, self._seen) < self._clear:
+        places = self._places(now.time, x)
+        known = not self.has_sides or now.memory is self._clear_memory
+        if known and farthest(places, self._seen) < self._clear:
             return NOWHERE
-        gap = in_front(self.term.obstacle.gap(places), self._behind)
+        gap = self._gap(now, places)
         near = np.flatnonzero(~(gap.distance >= self.term.law.range))  # a NaN is to be noticed
         if not near.size and np.isfinite(gap.distance).all():
             self._seen, self._clear = places, float(gap.distance.min()) - self.term.law.range
+            self._clear_memory = now.memory
         return near, Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
 
-    def clipped_gaps(self, time: float, x: FloatArray) -> FloatArray:
+    def clipped_gaps(self, now: Instant, x: FloatArray) -> FloatArray:
         """Gaps of all points, at most the range, shape (k,), m."""
-        near, gap = self._near(time, x)
+        near, gap = self._near(now, x)
         out = np.full(len(self.areas), self.term.law.range)
         out[near] = gap.distance
         return out
 
-    def smallest_gap(self, time: float, x: FloatArray) -> float:
+    def smallest_gap(self, now: Instant, x: FloatArray) -> float:
         """Smallest gap within the range of the law, m; inf if there is none."""
-        near, gap = self._near(time, x)
+        near, gap = self._near(now, x)
         return float(gap.distance.min()) if near.size else np.inf
 
     def _relative(self, time: float, v: FloatArray, near: IntArray) -> FloatArray | None:
         """Velocity against the obstacle, shape (j, 3); None where the law does not ask."""
-        return self.at_points(v)[near] - self.term.shift(time)[1] if self.rated else None
+        return self.at_points(v)[near] - self.term.shift(time)[1] if self.rate_dependent else None
 
-    def add_force(self, time: float, x: FloatArray, v: FloatArray, out: FloatArray) -> None:
-        """Add the nodal forces at positions x and velocities v, shape (n, 3), to out, N."""
-        near, gap = self._near(time, x)
+    def add_force(self, at: Configuration, out: FloatArray) -> None:
+        """Add the nodal forces to out, N."""
+        near, gap = self._near(at.now, at.x)
         if not near.size:
             return
-        traction, _, _ = self._law(gap, self._relative(time, v, near))
+        traction, _, _ = self._law(gap, self._relative(at.now.time, at.v, near))
         force = np.zeros((len(self.areas), 3))
         force[near] = (self.areas[near] * traction)[:, None] * gap.normal
         for group, part in zip(self.groups, self.slices, strict=True):
@@ -150,18 +142,17 @@ class Obstacle:
 
     def add_tangent(
         self,
-        time: float,
-        x: FloatArray,
-        v: FloatArray,
+        at: Configuration,
         factor: float,
         rate_factor: float,
         out: list[FloatArray],
+        labels: Collection[str] | None = None,
     ) -> None:
         """Add -(factor dF/dU + rate_factor dF/dV) to the element matrices of the blocks."""
-        near, gap = self._near(time, x)
+        near, gap = self._near(at.now, at.x) if chosen(self.labels[0], labels) else NOWHERE
         if not near.size:
             return
-        relative = self._relative(time, v, near)
+        relative = self._relative(at.now.time, at.v, near)
         traction, by_gap, by_rate = self._law(gap, relative)
         n = gap.normal
         row = (factor * by_gap + rate_factor * by_rate)[:, None] * n
@@ -179,21 +170,43 @@ class Obstacle:
                 out[group.block],
             )  # fmt: skip
 
-    def energy(self, time: float, x: FloatArray) -> float:
-        """Energy, J; zero for a rated law."""
-        near, gap = self._near(time, x)
+    def energy(self, now: Instant, x: FloatArray) -> float:
+        """Energy with the nodes at x, J; zero for a law of rates."""
+        near, gap = self._near(now, x)
         return float(np.sum(self.areas[near] * self.term.law.energy(gap.distance)))
 
-    def touch(self, time: float, displacement: FloatArray, velocity: FloatArray) -> Touch:
-        """Area, resultant, largest traction and smallest gap at a state."""
-        gap = self.term.obstacle.gap(self._places(time, self.points + displacement))
-        gap = in_front(gap, self._behind)
+    def energies(self, at: Configuration) -> dict[str, float]:
+        """Energy of a law that has one, J."""
+        return {} if self.rate_dependent else {self.labels[0]: self.energy(at.now, at.x)}
+
+    def powers(self, at: Configuration) -> dict[str, float]:
+        """Power of a law of rates, and of an obstacle that moves, W."""
+        if not self.rate_dependent and self.term.motion is None:
+            return {}
+        force = np.zeros_like(at.x)
+        self.add_force(at, force)
+        if self.rate_dependent:
+            return {self.labels[0]: float(np.sum(force * at.v[: len(force)]))}
+        shift = self.term.shift(at.now.time)[1]
+        return {f"{self.labels[0]}_motion": float(force.sum(axis=0) @ shift)}
+
+    def touch(self, at: Configuration) -> Touch:
+        """Return what is touched, where, and how hard."""
+        gap = self._gap(at.now, self._places(at.now.time, at.x))
         near = np.flatnonzero(gap.distance < self.term.law.range)
         part = Gap(gap.distance[near], gap.normal[near], gap.curvature[near])
-        traction, _, _ = self._law(part, self._relative(time, velocity, near))
+        traction, _, _ = self._law(part, self._relative(at.now.time, at.v, near))
         force = (self.areas[near] * traction) @ part.normal
         largest = float(traction.max()) if near.size else 0.0
-        return Touch(float(self.areas[near].sum()), force, largest, float(gap.distance.min()))
+        pushed = np.zeros((len(self.areas), 3))
+        pushed[near, 0] = self.areas[near] * traction
+        pushed[:, 1] = self.areas
+        sums = np.zeros_like(at.x)
+        for group, points in zip(self.groups, self.slices, strict=True):
+            spread(pushed[points], group.faces, group.kind.shapes, sums)
+        pressure = np.divide(sums[:, 0], sums[:, 1], np.zeros(len(sums)), where=sums[:, 1] > 0)
+        area = float(self.areas[near].sum())
+        return Touch(area, force, largest, float(gap.distance.min()), pressure)
 
 
 def _areas(group: FaceGroup, points: FloatArray) -> FloatArray:
@@ -260,7 +273,7 @@ def spread(force: FloatArray, faces: IntArray, shapes: FloatArray, out: FloatArr
 @compiled
 def add_matrices(
     matrices: FloatArray,
-    touched: FloatArray,
+    touched: BoolArray,
     shapes: FloatArray,
     cells: IntArray,
     local: IntArray,

@@ -19,6 +19,7 @@ import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import BadScene
+from dolfin_tongue.control import Instant
 from dolfin_tongue.direct.model import Model
 
 #: Energy that contact may make by errors of a method, over the largest energy so far, kinetic and
@@ -35,17 +36,17 @@ class Refused(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Instant:
+class Moment:
     """A stage or an end of a step.
 
     Parameters
     ----------
-    time : s.
-    u, v : displacement and velocity, shape (n, 3).
-    forces : nodal forces of each obstacle, shape (n, 3), N, as they act in the method.
+    now : time and memory.
+    u, v : displacement and velocity, shape (N, 3).
+    forces : nodal forces of each obstacle, shape (N, 3), N, as they act in the method.
     """
 
-    time: float
+    now: Instant
     u: FloatArray
     v: FloatArray
     forces: list[FloatArray]
@@ -61,54 +62,57 @@ class Impacts:
 
     def __init__(self, model: Model):
         self.model = model
-        self.obstacles = [obstacle for _, obstacle in model.obstacles]
+        self.obstacles = model.obstacles
         #: Impulses on the tissue since the beginning of the run, shape (obstacles, 3), N s.
         self.impulses = np.zeros((len(self.obstacles), 3))
         self._largest = self._made = 0.0
-        self._pending: tuple[Instant, float, float, FloatArray] | None = None
+        self._pending: tuple[Moment, float, float, FloatArray] | None = None
 
     @property
     def names(self) -> str:
         """What messages call the contacts."""
         return ", ".join(obstacle.name for obstacle in self.obstacles)
 
-    def instant(self, time: float, u: FloatArray, v: FloatArray) -> Instant:
+    def moment(self, now: Instant, u: FloatArray, v: FloatArray) -> Moment:
         """Evaluate the contacts at a state."""
         forces = []
         for obstacle in self.obstacles:
             forces.append(np.zeros_like(u))
-            obstacle.add_force(time, self.model.position(u), v, forces[-1])
-        return Instant(time, u, v, forces)
+            obstacle.add_force(self.model.at(now, u, v), forces[-1])
+        return Moment(now, u, v, forces)
 
-    def passed(self, time: float, u: FloatArray) -> str:
+    def passed(self, now: Instant, u: FloatArray) -> str:
         """Which obstacle a point has reached or passed, in words; empty if none."""
         for obstacle in self.obstacles:
             if obstacle.impassable:
-                gap = obstacle.smallest_gap(time, self.model.position(u))
+                gap = obstacle.smallest_gap(now, self.model.position(u))
                 if not gap > 0:
                     return f"a point would be {-gap:.2g} m behind the obstacle; {obstacle.name}"
         return ""
 
-    def near(self, time: float, u: FloatArray) -> bool:
+    def near(self, now: Instant, u: FloatArray) -> bool:
         """Whether a point is within the range of a contact."""
         x = self.model.position(u)
-        return any(obstacle.smallest_gap(time, x) < np.inf for obstacle in self.obstacles)
+        return any(obstacle.smallest_gap(now, x) < np.inf for obstacle in self.obstacles)
 
-    def begin(self, time: float, u: FloatArray, v: FloatArray) -> None:
+    def begin(self, now: Instant, u: FloatArray, v: FloatArray) -> None:
         """Take a state as a new beginning; BadScene where it is behind an obstacle."""
         if not self.obstacles:
             return
-        self.model.begin_step(time, u)
-        if cause := self.passed(time, u):
-            raise BadScene(f"t = {time:.6g} s, the beginning: {cause}")
-        self._largest = max(self._largest, self._energy(time, u, v))
+        if cause := self.passed(now, u):
+            raise BadScene(f"t = {now.time:.6g} s, the beginning: {cause}")
+        self._largest = max(self._largest, self._energy(now, u, v))
+
+    def forget(self) -> None:
+        """Drop the step that was judged last."""
+        self._pending = None
 
     def judge(
         self,
         h: float,
-        first: Instant,
-        last: Instant,
-        stages: Sequence[tuple[float, Instant]],
+        first: Moment,
+        last: Moment,
+        stages: Sequence[tuple[float, Moment]],
         dissipates: bool = False,
     ) -> str:
         """Why a step is not to be accepted, in words; empty if it may be, by `accept`.
@@ -120,7 +124,7 @@ class Impacts:
         stages : with the weights of their forces in the velocity.
         dissipates : the method makes no energy; only the gaps are asked for.
         """
-        if cause := self.passed(last.time, last.u):
+        if cause := self.passed(last.now, last.u):
             return cause
         made, total = 0.0, np.zeros_like(self.impulses)
         for number in range(len(self.obstacles)):
@@ -136,7 +140,7 @@ class Impacts:
         return ""
 
     def _made_by(
-        self, number: int, h: float, first: Instant, last: Instant, impulse: FloatArray
+        self, number: int, h: float, first: Moment, last: Moment, impulse: FloatArray
     ) -> float:
         """Energy that one contact makes in a step, J.
 
@@ -145,11 +149,11 @@ class Impacts:
         """
         obstacle, x = self.obstacles[number], self.model.position
         path, mean = last.u - first.u, 0.5 * h * (first.v + last.v)
-        moved = obstacle.term.shift(last.time)[0] - obstacle.term.shift(first.time)[0]
+        moved = obstacle.term.shift(last.now.time)[0] - obstacle.term.shift(first.now.time)[0]
         work = float(np.sum(impulse * (mean - moved))) / h
         steady = lasting(first.forces[number], last.forces[number])
         work += float(np.sum(steady * (path - mean)))
-        stored = obstacle.energy(last.time, x(last.u)) - obstacle.energy(first.time, x(first.u))
+        stored = obstacle.energy(last.now, x(last.u)) - obstacle.energy(first.now, x(first.u))
         return work + stored
 
     def accept(self) -> None:
@@ -157,17 +161,17 @@ class Impacts:
         if self._pending is not None:
             last, h, made, impulses = self._pending
             self._made = max(0.0, self._made + made) * np.exp(-h / MEMORY)
-            self._largest = max(self._largest, self._energy(last.time, last.u, last.v))
+            self._largest = max(self._largest, self._energy(last.now, last.u, last.v))
             self.impulses += impulses
             self._pending = None
 
-    def _energy(self, time: float, u: FloatArray, v: FloatArray) -> float:
+    def _energy(self, now: Instant, u: FloatArray, v: FloatArray) -> float:
         """Kinetic energy, and that stored in contacts, J."""
         kinetic = 0.5 * float(np.sum(v * (self.model.whole_mass @ v)))
         x = self.model.position(u)
-        return kinetic + sum(obstacle.energy(time, x) for obstacle in self.obstacles)
+        return kinetic + sum(obstacle.energy(now, x) for obstacle in self.obstacles)
 
-    def _leaps(self, stages: Sequence[tuple[float, FloatArray, FloatArray]]) -> str:
+    def _leaps(self, stages: Sequence[tuple[Instant, FloatArray, FloatArray]]) -> str:
         """Where a gap changes too much from the first stage to be resolved; empty if nowhere."""
         for obstacle in self.obstacles:
             if obstacle.impassable:
@@ -180,22 +184,22 @@ class Impacts:
     def explicit(
         self,
         h: float,
-        new: tuple[float, FloatArray, FloatArray],
-        stages: Sequence[tuple[float, FloatArray, FloatArray]],
+        new: tuple[Instant, FloatArray, FloatArray],
+        stages: Sequence[tuple[Instant, FloatArray, FloatArray]],
         weights: Sequence[float],
     ) -> None:
-        """Count a step of an explicit method, from its stages (time, u, v); or raise Refused."""
+        """Judge a step of an explicit method, from its stages (instant, u, v); or raise Refused."""
+        self._pending = None
         if cause := self.passed(new[0], new[1]):
             raise Refused(cause)
         if not (self.near(*new[:2]) or self.near(*stages[0][:2])):
             return
         if cause := self._leaps([*stages, new]):
             raise Refused(cause)
-        parts = [self.instant(*stage) for stage in stages]
+        parts = [self.moment(*stage) for stage in stages]
         weighted = list(zip(weights, parts, strict=True))
-        if cause := self.judge(h, parts[0], self.instant(*new), weighted):
+        if cause := self.judge(h, parts[0], self.moment(*new), weighted):
             raise Refused(cause)
-        self.accept()
 
 
 def lasting(first: FloatArray, last: FloatArray) -> FloatArray:

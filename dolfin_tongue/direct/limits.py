@@ -23,14 +23,15 @@ import scipy.sparse as sp
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.boundary.contact import Contact
-from dolfin_tongue.constitutive.active import FibreStress
+from dolfin_tongue.constitutive.fibre_stress import FibreStress
+from dolfin_tongue.control import Instant
 from dolfin_tongue.direct.border import condensed
 from dolfin_tongue.direct.model import Model
 from dolfin_tongue.direct.multipliers import Acceleration
 from dolfin_tongue.terms.term import SurfaceTerm, Term
 
-#: Time, displacement and velocity (all rows).
-State = tuple[float, FloatArray, FloatArray]
+#: Instant, displacement and velocity (all rows).
+Motion = tuple[Instant, FloatArray, FloatArray]
 
 #: Smallest |z| on the boundary of the stability region of Runge-Kutta 4 in the left half-plane.
 RK4_RADIUS = 2.61
@@ -63,10 +64,10 @@ class StabilityLimits:
         self._vectors: dict[tuple[object, str], FloatArray] = {}
 
     def __call__(
-        self, time: float, displacement: FloatArray, velocity: FloatArray, pressure: FloatArray
+        self, now: Instant, displacement: FloatArray, velocity: FloatArray, pressure: FloatArray
     ) -> Limit:
         """Limit at a state; the multipliers enter through the Hessians of the constraints (101)."""
-        state = (time, displacement, velocity)
+        state = (now, displacement, velocity)
         rate = _bound(*self._radii("all", state, pressure, None))
         by_tau = 1.0 / self.acceleration.tau if self.acceleration.tau else 0.0
         if by_tau >= rate:
@@ -76,18 +77,17 @@ class StabilityLimits:
             return Limit(np.inf, "nothing")
         return Limit(RK4_RADIUS / rate, self._cause(state, rate))
 
-    def _cause(self, state: State, rate: float) -> str:
+    def _cause(self, state: Motion, rate: float) -> str:
         """Name the term whose own radius is the largest."""
         model = self.model
-        terms: list[Term | None] = [
-            term for term, _ in (*model.laws, *model.membranes, *model.obstacles)
-        ]
-        if self.acceleration.columns is not None:
+        named = dict(zip(model.scene.labels, model.scene.terms, strict=True))
+        labels = dict.fromkeys(label for part in model.parts for label in part.labels)
+        terms: list[Term | None] = [named[label] for label in labels]
+        own: list[tuple[str, ...]] = [(label,) for label in labels]
+        if self.acceleration.columns.shape[2]:
             terms.append(None)  # the loads of the rigid bodies
-        parts = [
-            self._radii(i, state, None, () if term is None else (term,))
-            for i, term in enumerate(terms)
-        ]
+            own.append(())
+        parts = [self._radii(i, state, None, labels) for i, labels in enumerate(own)]
         bounds = [_bound(*part) for part in parts]
         worst = int(np.argmax(bounds)) if bounds else 0
         if not bounds or bounds[worst] < 0.3 * rate:
@@ -101,50 +101,49 @@ class StabilityLimits:
     def _moved(self, vector: FloatArray) -> str:
         """Name of the rigid body with most of the kinetic energy of a mode."""
         bodies = self.model.bodies
-        assert bodies is not None
         energy = np.zeros(bodies.given.size)
         own = np.diag(bodies.loads.mass(np.zeros(len(energy))))[bodies.unknown]
-        energy[bodies.unknown] = own * vector[3 * len(self.model.free) :] ** 2
+        energy[bodies.unknown] = own * vector[3 * len(self.model.numbering.free) :] ** 2
         return bodies.bodies[int(energy.reshape(-1, 3).sum(axis=1).argmax())].name
 
     def _radii(
         self,
         key: object,
-        state: State,
+        state: Motion,
         pressure: FloatArray | None,
-        terms: tuple[Term, ...] | None,
+        labels: tuple[str, ...] | None,
     ) -> tuple[float, float]:
         """Radii c, 1/s, and w, 1/s, of some terms; of no terms: of the loads of rigid bodies."""
         model = self.model
-        self.acceleration.turn(state[1])
-        own = self._own(state, pressure, terms)
-        stiffness = model.element_tangents(*state, 1.0, 0.0, terms)
+        self.acceleration.update_geometry(state[1])
+        own, at = self._own(state, pressure, labels), model.at(*state)
+        stiffness = model.element_tangents(at, 1.0, 0.0, labels)
         if pressure is not None:
-            model.add_constraint_hessians(state[1], -pressure, stiffness)
+            model.constraints.add_hessians(state[1], -pressure, stiffness)
         w2 = self._power((key, "stiffness"), self._matrix(stiffness, own[0]), state[1])
-        if not (model.rated or np.any(own[1])):
+        if not (model.rate_dependent or np.any(own[1])):
             return 0.0, float(np.sqrt(w2))
-        damping = model.element_tangents(*state, 0.0, 1.0, terms)
+        damping = model.element_tangents(at, 0.0, 1.0, labels)
         c = self._power((key, "damping"), self._matrix(damping, own[1]), state[1])
         return c, float(np.sqrt(w2))
 
     def _own(
-        self, state: State, pressure: FloatArray | None, terms: tuple[Term, ...] | None
+        self, state: Motion, pressure: FloatArray | None, labels: tuple[str, ...] | None
     ) -> tuple[FloatArray | float, FloatArray | float]:
         """Stiffness and damping of the coordinates that do not come from the elements."""
         model = self.model
-        if model.bodies is None or self.acceleration.columns is None or terms:
+        if not self.acceleration.columns.shape[2] or labels:
             return 0.0, 0.0
-        force = np.zeros_like(model.load)
+        force = np.zeros_like(model.body.points)
         if pressure is not None:
             force = model.force(*state)
-            model.add_constraint_force(model.constraint_gradients(state[1]), pressure, force)
-        return model.bodies.tangents(*state, model.whole(force))
+            model.constraints.add_force(model.constraints.gradients(state[1]), pressure, force)
+        return model.bodies.tangents(*state, model.numbering.padded(force))
 
     def _matrix(self, matrices: list[FloatArray], own: FloatArray | float) -> sp.csr_array:
         """Sparse matrix over the unknowns."""
         matrix, columns = assembled(self.model, matrices), self.acceleration.columns
-        if columns is None:
+        if not columns.shape[2]:
             return matrix
         C, R, E = condensed(self.model, matrices, columns, columns)
         return sp.block_array([[matrix, C], [R, E + own]], format="csr")
@@ -159,7 +158,7 @@ class StabilityLimits:
             self._vectors[key] = vector
         if not matrix.nnz or not np.abs(matrix.data).max() > 0:
             return 0.0
-        gradients = self.model.constraint_gradients(displacement)
+        gradients = self.model.constraints.gradients(displacement)
         radius = 0.0
         for _ in range(200):
             vector = vector / np.linalg.norm(vector)
@@ -173,9 +172,9 @@ class StabilityLimits:
     def _project(self, force: FloatArray, gradients: list[FloatArray]) -> FloatArray:
         """Acceleration by a force, with the constraints kept."""
         free = self.acceleration.solve(force)
-        full = np.zeros(self.model.shape)
+        full = np.zeros(self.model.numbering.shape)
         self.acceleration.add(free, full)
-        push, _ = self.acceleration.push(gradients, -self.model.constraint_rate(gradients, full))
+        push, _ = self.acceleration.push(gradients, -self.model.constraints.rate(gradients, full))
         return free + push
 
 
@@ -202,7 +201,7 @@ def _describe(term: Term, c: float, w: float, rate: float) -> str:
 def assembled(model: Model, matrices: list[FloatArray]) -> sp.csr_array:
     """Sparse matrix over the free components from element matrices (m, 3k, 3k)."""
     rows, columns, values = [], [], []
-    for dofs, part in zip(model.block_dofs, matrices, strict=True):
+    for dofs, part in zip(model.numbering.part_dofs, matrices, strict=True):
         row = np.broadcast_to(dofs[:, :, None], part.shape)
         column = np.broadcast_to(dofs[:, None], part.shape)
         keep = (row >= 0) & (column >= 0)
@@ -210,5 +209,5 @@ def assembled(model: Model, matrices: list[FloatArray]) -> sp.csr_array:
         columns.append(column[keep])
         values.append(part[keep])
     place = (np.concatenate(rows), np.concatenate(columns))
-    size = 3 * len(model.free)
+    size = 3 * len(model.numbering.free)
     return sp.coo_array((np.concatenate(values), place), shape=(size, size)).tocsr()

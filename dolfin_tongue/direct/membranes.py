@@ -20,32 +20,44 @@ force is *minus* that, where (47) is printed with a plus. With B = dE/dU the tan
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
+from collections.abc import Collection
 
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.compiled import compiled
+from dolfin_tongue.base.values import Value
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.face_groups import FaceGroup
+from dolfin_tongue.body.regions import on_cells
 from dolfin_tongue.boundary.skin import Skin
 from dolfin_tongue.boundary.surface_tension import SurfaceTension
-from dolfin_tongue.direct.faces import FaceGroup
+from dolfin_tongue.direct.parts import Configuration, Part, chosen
 
 
-class Membrane(ABC):
+class Membrane(Part):
     """One term on one group of faces.
 
     Parameters
     ----------
+    label : of the term.
+    body : the tissue.
     group : f faces with q points.
-    points : ndarray, shape (n, 3), m -- reference positions.
     """
 
-    def __init__(self, group: FaceGroup, points: FloatArray):
-        self.group = group
-        _, metric = self._metric(points)
+    def __init__(self, label: str, body: Body, group: FaceGroup):
+        self.labels, self.group, self._body = (label,), group, body
+        _, metric = self._metric(body.points)
         self.rest = determinant(metric)
         #: a^ab as 11, 22, 12, shape (f, q, 3), 1/m2.
         self.rest_inverse = conjugate(metric) / self.rest[..., None]
+
+    def _number(self, value: Value, what: str) -> FloatArray:
+        """Value on the cells of the faces, shape (f or 1, 1)."""
+        block = self._body.blocks[self.group.block]
+        cells = on_cells(what, value, self._body).part(block.numbers).part(self.group.cells)
+        return cells.contiguous
 
     @abstractmethod
     def coefficients(self, det: FloatArray) -> tuple[FloatArray | float, FloatArray, FloatArray]:
@@ -71,60 +83,64 @@ class Membrane(ABC):
             stress += np.asarray(alpha)[..., None] * self.rest_inverse
         return stress, beta, gamma
 
-    def add_force(self, x: FloatArray, out: FloatArray) -> None:
-        """Add the nodal forces at positions x, shape (n, 3), to out, shape (n, 3), N."""
+    def add_force(self, at: Configuration, out: FloatArray) -> None:
+        """Add the nodal forces to out, shape (n, 3), N."""
         kind = self.group.kind
-        base, metric = self._metric(x)
+        base, metric = self._metric(at.x)
         stress, _, _ = self._stress(metric)
         add_forces(stress, base, self.group.faces, kind.gradients, kind.weights, out)
 
-    def add_tangent(self, x: FloatArray, factor: float, out: FloatArray) -> None:
-        """Add factor times minus the force's derivative to the elements' matrices, N/m.
-
-        Parameters
-        ----------
-        x : ndarray, shape (n, 3), m.
-        factor : dimensionless.
-        out : ndarray, shape (m, 3k, 3k) -- of the block of the group; dofs by component, then node.
-        """
+    def add_tangent(
+        self,
+        at: Configuration,
+        factor: float,
+        rate_factor: float,
+        out: list[FloatArray],
+        labels: Collection[str] | None = None,
+    ) -> None:
+        """Add factor times minus the force's derivative to the elements' matrices, N/m."""
+        if not factor or not chosen(self.labels[0], labels):
+            return
         group, kind = self.group, self.group.kind
-        base, metric = self._metric(x)
+        base, metric = self._metric(at.x)
         stress, beta, gamma = self._stress(metric)
         add_matrices(
-            stress, beta, gamma, base, conjugate(metric), kind.gradients, factor * kind.weights,
-            group.cells, group.local, out,
+            stress, (beta, gamma), base, conjugate(metric),
+            (kind.gradients, factor * kind.weights), (group.cells, group.local), out[group.block],
         )  # fmt: skip
 
-    def energy(self, x: FloatArray) -> float:
+    def energies(self, at: Configuration) -> dict[str, float]:
         """Energy, J."""
-        _, metric = self._metric(x)
+        _, metric = self._metric(at.x)
         density = self.energy_density(metric, determinant(metric))
-        return float(np.sum(self.group.kind.weights * density))
+        return {self.labels[0]: float(np.sum(self.group.kind.weights * density))}
 
 
 class Film(Membrane):
     """Law of `SurfaceTension` (11), (12)."""
 
-    def __init__(self, term: SurfaceTension, group: FaceGroup, points: FloatArray):
-        super().__init__(group, points)
-        self.term = term
+    def __init__(self, label: str, term: SurfaceTension, body: Body, group: FaceGroup):
+        super().__init__(label, body, group)
+        self.sigma = self._number(term.sigma, "SurfaceTension.sigma")
 
     def coefficients(self, det: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """No alpha; beta = sigma / J; gamma = -sigma / J^3."""
-        beta = self.term.sigma / np.sqrt(det)
+        beta = self.sigma / np.sqrt(det)
         return 0.0, beta, -beta / det
 
     def energy_density(self, metric: FloatArray, det: FloatArray) -> FloatArray:
         """Sigma J."""
-        return self.term.sigma * np.sqrt(det)
+        return self.sigma * np.sqrt(det)
 
 
 class NeoHookean(Membrane):
     """Law of `Skin`."""
 
-    def __init__(self, term: Skin, group: FaceGroup, points: FloatArray):
-        super().__init__(group, points)
-        self.scale = term.shear_modulus * term.thickness * np.sqrt(self.rest)
+    def __init__(self, label: str, term: Skin, body: Body, group: FaceGroup):
+        super().__init__(label, body, group)
+        modulus = self._number(term.shear_modulus, "Skin.shear_modulus")
+        thickness = self._number(term.thickness, "Skin.thickness")
+        self.scale = modulus * thickness * np.sqrt(self.rest)
 
     def coefficients(self, det: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Alpha, beta = -alpha det a / (det A)^2, gamma = 4 alpha det a / (det A)^3."""
@@ -204,14 +220,11 @@ def add_forces(
 @compiled
 def add_matrices(
     stress: FloatArray,
-    beta: FloatArray,
-    gamma: FloatArray,
+    coefficients: tuple[FloatArray, FloatArray],
     base: FloatArray,
     m: FloatArray,
-    gradients: FloatArray,
-    weights: FloatArray,
-    cells: IntArray,
-    local: IntArray,
+    rule: tuple[FloatArray, FloatArray],
+    owners: tuple[IntArray, IntArray],
     out: FloatArray,
 ) -> None:
     """Add B^T (gamma m m^T + beta Q) B + S^ab Y_K,a Y_L,b I to element matrices.
@@ -219,12 +232,13 @@ def add_matrices(
     Parameters
     ----------
     stress, m : shape (f, q, 3).
-    beta, gamma : shape (f, q).
+    coefficients : beta and gamma, shape (f, q) each.
     base : shape (f, q, 2, 3).
-    gradients, weights : shapes (q, k, 2) and (q,).
-    cells, local : shapes (f,) and (f, k).
+    rule : gradients and weights, shapes (q, k, 2) and (q,).
+    owners : elements below the faces and their own numbers of the nodes, shapes (f,) and (f, k).
     out : shape (m, 3k', 3k') with the k' nodes of the elements.
     """
+    (beta, gamma), (gradients, weights), (cells, local) = coefficients, rule, owners
     count, size = local.shape[1], out.shape[1] // 3
     B = np.empty((4, 3 * count))  # dE_11, dE_22, 2 dE_12 by the nodes, and m . dE
     place = np.empty(3 * count, dtype=np.int64)

@@ -52,6 +52,7 @@ from scipy.sparse.linalg import splu
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import BadScene, OutOfRange, require_positive
+from dolfin_tongue.control import Instant
 from dolfin_tongue.direct import points
 from dolfin_tongue.direct.border import MassBorder, condensed_gradient
 from dolfin_tongue.direct.model import Model
@@ -83,16 +84,16 @@ class Acceleration:
             require_positive(self, "s", tau=tau)
         if metric not in ("dalembert", "report"):
             raise OutOfRange("constraint_metric", metric, '"dalembert" or "report"')
-        if metric == "report" and (model.slides or model.bodies):
+        numbering = model.numbering
+        if metric == "report" and (model.constraints.slide_scale.size or numbering.has_bodies):
             raise BadScene(
                 'constraint_metric="report" has no inverse mass in the constraint forces, so that '
                 'it can drive neither rigid bodies nor sliding nodes; take "dalembert"'
             )
         self.model, self.tau, self.metric = model, tau, metric
-        free = model.free
+        free = numbering.free
         mass = model.mass[free][:, free]
-        held = model.problem.held.size or model.bodies
-        self._mass_of_held = model.whole_mass if held else None
+        self._held = bool(numbering.held.size) or numbering.has_bodies
         self._lumped = np.asarray(model.mass.sum(axis=1)).ravel()[free]
         self.dense = len(free) <= DENSE_NODES
         if model.lumped:
@@ -102,14 +103,14 @@ class Acceleration:
             self.solve_mass = lambda rhs: self._inverse @ rhs
         else:
             self.solve_mass = splu(mass.tocsc()).solve
-        #: `Bodies.columns` at the state of the last `turn`; None where no coordinate is unknown.
-        self.columns: FloatArray | None = None
-        coordinates = model.bodies is not None and model.bodies.unknown.size
+        #: `Bodies.columns` at the state of the last `update_geometry`; none without unknown ones.
+        self.columns: FloatArray = np.zeros((len(model.bodies.rows), 3, 0))
+        coordinates = model.bodies.unknown.size
         self._border = MassBorder(model, self.solve_mass) if coordinates else None
         self._preconditioner: Callable[[FloatArray], FloatArray] | None = None
 
     def __call__(
-        self, time: float, displacement: FloatArray, velocity: FloatArray
+        self, now: Instant, displacement: FloatArray, velocity: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Acceleration of all rows, shape (N, 3), m/s2, and multipliers, shape (c,), Pa.
 
@@ -117,42 +118,46 @@ class Acceleration:
         are given there too.
         """
         model = self.model
-        self.turn(displacement)
-        force = model.whole(model.force(time, displacement, velocity))
-        acceleration = model.held_acceleration(time, displacement, velocity)
-        if self._mass_of_held is not None:
-            force -= self._mass_of_held @ acceleration
-        change, gradients = model.constraint(displacement)
-        force = model.reduced(time, displacement, velocity, acceleration, force)
+        self.update_geometry(displacement)
+        force = model.numbering.padded(model.force(now, displacement, velocity))
+        acceleration = model.held_acceleration(now.time, displacement, velocity)
+        if self._held:
+            force -= model.whole_mass @ acceleration
+        change, gradients = model.constraints.evaluate(displacement)
+        force = model.reduced(now, displacement, velocity, acceleration, force)
         self.add(self.solve(force), acceleration)
-        r = -model.constraint_curvature(displacement, velocity)
-        r -= model.constraint_rate(gradients, acceleration)
+        r = -model.constraints.curvature(displacement, velocity)
+        r -= model.constraints.rate(gradients, acceleration)
         if self.tau is not None:
-            r -= 2 / self.tau * model.constraint_rate(gradients, velocity)
+            r -= 2 / self.tau * model.constraints.rate(gradients, velocity)
             r -= change / self.tau**2
         push, pressure = self.push(gradients, r)
         self.add(push, acceleration)
         return acceleration, pressure
 
-    def turn(self, displacement: FloatArray) -> None:
+    def update_geometry(self, displacement: FloatArray) -> None:
         """Take the position of the rigid bodies, on which the mass of their coordinates depends."""
-        self.columns = self.model.columns(displacement)
-        if self._border is not None and self.columns is not None:
-            self._border.turn(self.columns)
+        if self._border is not None:
+            self.columns = self.model.bodies.columns(displacement)
+            self._border.update_geometry(self.columns)
 
     def solve(self, force: FloatArray) -> FloatArray:
         """Accelerations of the unknowns by forces on them, shape (d,) or (d, k): Gamma."""
         if self._border is None:
-            return self.solve_mass(force.reshape(len(self.model.free), -1)).reshape(force.shape)
-        nodal = force[: 3 * len(self.model.free)]
-        free = self.solve_mass(nodal.reshape(len(self.model.free), -1)).reshape(nodal.shape)
+            return self.solve_mass(force.reshape(len(self.model.numbering.free), -1)).reshape(
+                force.shape
+            )
+        nodal = force[: 3 * len(self.model.numbering.free)]
+        free = self.solve_mass(nodal.reshape(len(self.model.numbering.free), -1)).reshape(
+            nodal.shape
+        )
         return self._border.complete(free, force[len(nodal) :])
 
     def add(self, values: FloatArray, rows: FloatArray) -> None:
         """Add accelerations of unknowns to an array of all rows, what they carry included."""
-        self.model.add_unknowns(values, rows)
-        if self.columns is not None and self.model.bodies is not None:
-            own = values[3 * len(self.model.free) :]
+        self.model.numbering.add_unknowns(values, rows)
+        if self.columns.shape[2]:
+            own = values[3 * len(self.model.numbering.free) :]
             rows[self.model.bodies.rows] += self.columns @ own
 
     def push(self, gradients: list[FloatArray], r: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -166,7 +171,9 @@ class Acceleration:
 
     def _nothing(self) -> tuple[FloatArray, FloatArray]:
         """NaN, which the steppers notice."""
-        return np.full(self.model.size, np.nan), np.full(self.model.constraint_count, np.nan)
+        return np.full(self.model.numbering.size, np.nan), np.full(
+            self.model.constraints.count, np.nan
+        )
 
     def _push(self, gradients: list[FloatArray], r: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self.metric == "report":
@@ -201,7 +208,7 @@ class Acceleration:
         """Conjugate gradients on D with the lumped D of an earlier state as preconditioner."""
         precondition = self._preconditioner or self._factored(self.lumped_D(G))
         self._preconditioner = precondition
-        pressure, push = np.zeros_like(r), np.zeros(self.model.size)
+        pressure, push = np.zeros_like(r), np.zeros(self.model.numbering.size)
         residual = r.copy()
         direction = z = precondition(residual)
         product = residual @ z
@@ -226,7 +233,10 @@ class Acceleration:
         """G Gamma G^T with the lumped mass of the nodes."""
         if self._border is None:
             return ((G * (1.0 / np.repeat(self._lumped, 3))) @ G.T).tocsc()
-        nodal, own = G[:, : 3 * len(self.model.free)], G[:, 3 * len(self.model.free) :]
+        nodal, own = (
+            G[:, : 3 * len(self.model.numbering.free)],
+            G[:, 3 * len(self.model.numbering.free) :],
+        )
         D = (nodal * (1.0 / np.repeat(self._lumped, 3))) @ nodal.T
         return (D + own @ sp.csr_array(self._border.inverse) @ own.T).tocsc()
 
@@ -238,16 +248,16 @@ class Acceleration:
     def sparse_gradient(self, gradients: list[FloatArray]) -> sp.csr_array:
         """G = dA/dU over the unknowns, shape (c, d), m2."""
         rows, columns, values = [], [], []
-        for part, gradient in zip(self.model.constrained, gradients, strict=True):
+        for part, gradient in zip(self.model.constraints.parts, gradients, strict=True):
             numbers = np.arange(part.numbers.start, part.numbers.stop)
             rows.append(np.repeat(numbers, 3 * part.cells.shape[1]))
-            columns.append(self.model.dofs[part.cells].ravel())
+            columns.append(self.model.numbering.dofs[part.cells].ravel())
             values.append(gradient.ravel())
         row, column, value = (np.concatenate(part) for part in (rows, columns, values))
         keep = column >= 0
-        shape = (self.model.constraint_count, 3 * len(self.model.free))
+        shape = (self.model.constraints.count, 3 * len(self.model.numbering.free))
         G = sp.coo_array((value[keep], (row[keep], column[keep])), shape=shape).tocsr()
-        if self.columns is None:
+        if not self.columns.shape[2]:
             return G
         own = condensed_gradient(self.model, gradients, self.columns)
         return sp.hstack([G, sp.csr_array(own)], format="csr")
@@ -260,9 +270,9 @@ def dense_gradient(
 
     Over the free components; with `Bodies.columns` also over the unknown coordinates.
     """
-    G = np.zeros((model.constraint_count, 3 * len(model.free)))
-    for part, gradient in zip(model.constrained, gradients, strict=True):
-        points.scatter_gradients(gradient, part.cells, model.dofs, G[part.numbers])
-    if columns is None:
+    G = np.zeros((model.constraints.count, 3 * len(model.numbering.free)))
+    for part, gradient in zip(model.constraints.parts, gradients, strict=True):
+        points.scatter_gradients(gradient, part.cells, model.numbering.dofs, G[part.numbers])
+    if columns is None or not columns.shape[2]:
         return G
     return np.concatenate([G, condensed_gradient(model, gradients, columns)], axis=1)

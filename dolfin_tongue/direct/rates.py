@@ -25,6 +25,7 @@ from math import exp, sqrt
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.arrays import FloatArray as Array
 from dolfin_tongue.base.compiled import compiled
 from dolfin_tongue.direct.tensors import inverse_transpose, product_transposed
 
@@ -43,11 +44,15 @@ def _viscous(R: FloatArray, B: FloatArray, scale: float, L: FloatArray, P: Float
 
 
 @compiled
-def viscous_stress(F: FloatArray, rate: FloatArray, eta: float, out: FloatArray) -> None:
-    """Add the viscous stress to out, P, shape (m, q, 3, 3), Pa; eta in Pa s."""
+def viscous_stress(
+    F: Array, rate: Array, numbers: Array, fibres: Array, level: Array, out: Array
+) -> None:
+    """Add the viscous stress; see `tissue.PointLaw`. The number is eta, Pa s."""
     B, L, P = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    cells, points = numbers.shape[0] > 1, numbers.shape[1] > 1
     for cell in range(F.shape[0]):
         for point in range(F.shape[1]):
+            eta = numbers[cell if cells else 0, point if points else 0, 0]
             jacobian = inverse_transpose(F[cell, point], B)
             _viscous(rate[cell, point], B, 2.0 * eta * jacobian, L, P)
             for i in range(3):
@@ -57,18 +62,17 @@ def viscous_stress(F: FloatArray, rate: FloatArray, eta: float, out: FloatArray)
 
 @compiled
 def viscous_moduli(
-    F: FloatArray,
-    rate: FloatArray,
-    eta: float,
-    factor: float,
-    rate_factor: float,
-    out: FloatArray,
-) -> None:
+    F: Array, rate: Array, numbers: Array, fibres: Array, level: Array,
+    factors: tuple[float, float], out: Array,
+) -> None:  # fmt: skip
     """Add factor dP/dF + rate_factor dP/dR of `viscous_stress` to out, shape (m, q, 9, 9)."""
+    factor, rate_factor = factors
     B, L, P, G = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     mixed = np.empty((3, 3))
+    cells, points = numbers.shape[0] > 1, numbers.shape[1] > 1
     for cell in range(F.shape[0]):
         for point in range(F.shape[1]):
+            eta = numbers[cell if cells else 0, point if points else 0, 0]
             jacobian = inverse_transpose(F[cell, point], B)
             scale = 2.0 * eta * jacobian
             _viscous(rate[cell, point], B, scale, L, P)
@@ -109,8 +113,8 @@ def _add_viscous(
 
 @compiled
 def _tension(stretch: float, rate: float, law: FloatArray) -> tuple[float, float, float]:
-    """Tension f(stretch) g(rate) (73) and its two derivatives; law = (a, b, s, c, a_r, b_r)."""
-    a, b, s, c, a_r, b_r = law
+    """Tension f(stretch) g(rate) (73) and its two derivatives; law = (a, b, s, c, a_r, b_r, ..)."""
+    a, b, s, c, a_r, b_r = law[0], law[1], law[2], law[3], law[4], law[5]
     x = a * (stretch - 1.0 + s)
     # (74) times exp(b x) above and below: both exponents fall for a short fibre.
     up = exp(b * x)
@@ -122,34 +126,27 @@ def _tension(stretch: float, rate: float, law: FloatArray) -> tuple[float, float
 
 @compiled
 def active_stress(
-    F: FloatArray,
-    rate: FloatArray,
-    level: FloatArray,
-    fibres: FloatArray,
-    law: FloatArray,
-    out: FloatArray,
+    F: Array, rate: Array, numbers: Array, fibres: Array, level: Array, out: Array
 ) -> None:
-    """Add the active stress of all slots to out, P, shape (m, q, 3, 3), Pa.
+    """Add the active stress of all slots; see `tissue.PointLaw`.
 
-    Parameters
-    ----------
-    F, rate : shape (m, q, 3, 3).
-    level : shape (m, s), Pa -- max_stress times fibre density times activation of each slot.
-    fibres : shape (m, s, 3) -- unit vectors N.
-    law : (a, b, s, c) of (74), (75) and (a, b) of (76)-(78).
-    out : shape (m, q, 3, 3), Pa.
+    Here the numbers have an axis of slots, shape (m or 1, q or 1, s or 1, 7): (a, b, s, c) of (74),
+    (75), (a, b) of (76)-(78), and the largest stress, Pa.
     """
     B, n, w = np.empty((3, 3)), np.empty(3), np.empty(3)
+    cells, points, slots = numbers.shape[0] > 1, numbers.shape[1] > 1, numbers.shape[2] > 1
     for cell in range(F.shape[0]):
         for point in range(F.shape[1]):
             f, v = F[cell, point], rate[cell, point]
             jacobian = inverse_transpose(f, B)
+            own = numbers[cell if cells else 0, point if points else 0]
             for slot in range(level.shape[1]):
                 if level[cell, slot] == 0.0:
                     continue
-                N = fibres[cell, slot]
+                N, law = fibres[cell, slot], own[slot if slots else 0]
                 stretch, speed = _fibre(f, v, N, n, w)
-                tension = jacobian * level[cell, slot] * _tension(stretch, speed, law)[0]
+                strength = jacobian * law[6] * level[cell, slot]
+                tension = strength * _tension(stretch, speed, law)[0]
                 for i in range(3):
                     for j in range(3):
                         part = n[i] * N[j] / (stretch * stretch) - B[i, j] / 3.0
@@ -173,29 +170,26 @@ def _fibre(
 
 @compiled
 def active_moduli(
-    F: FloatArray,
-    rate: FloatArray,
-    level: FloatArray,
-    fibres: FloatArray,
-    law: FloatArray,
-    factor: float,
-    rate_factor: float,
-    out: FloatArray,
-) -> None:
+    F: Array, rate: Array, numbers: Array, fibres: Array, level: Array,
+    factors: tuple[float, float], out: Array,
+) -> None:  # fmt: skip
     """Add factor dP/dF + rate_factor dP/dR of `active_stress` to out, shape (m, q, 9, 9)."""
+    factor, rate_factor = factors
     B, n, w = np.empty((3, 3)), np.empty(3), np.empty(3)
     along = np.empty(3)
+    cells, points, slots = numbers.shape[0] > 1, numbers.shape[1] > 1, numbers.shape[2] > 1
     for cell in range(F.shape[0]):
         for point in range(F.shape[1]):
             f, v = F[cell, point], rate[cell, point]
             jacobian = inverse_transpose(f, B)
+            own = numbers[cell if cells else 0, point if points else 0]
             for slot in range(level.shape[1]):
                 if level[cell, slot] == 0.0:
                     continue
-                N = fibres[cell, slot]
+                N, law = fibres[cell, slot], own[slot if slots else 0]
                 stretch, speed = _fibre(f, v, N, n, w)
                 value, by_stretch, by_rate = _tension(stretch, speed, law)
-                scale = jacobian * level[cell, slot]
+                scale = jacobian * law[6] * level[cell, slot]
                 for k in range(3):
                     turn = w[k] / stretch - speed * n[k] / stretch**2
                     along[k] = (factor * by_stretch + rate_factor * by_rate) * n[k] / stretch
@@ -228,13 +222,17 @@ def _add_active(
 
 
 @compiled
-def constant_stress(F: FloatArray, level: FloatArray, fibres: FloatArray, out: FloatArray) -> None:
-    """Add P = T (F N) (x) N of all slots to out, shape (m, q, 3, 3), Pa; level T as above."""
+def constant_stress(
+    F: Array, rate: Array, numbers: Array, fibres: Array, level: Array, out: Array
+) -> None:
+    """Add P = T (F N) (x) N of all slots; the number, per slot as above, is the largest T, Pa."""
+    cells, points, slots = numbers.shape[0] > 1, numbers.shape[1] > 1, numbers.shape[2] > 1
     for cell in range(F.shape[0]):
-        for slot in range(level.shape[1]):
-            T, N = level[cell, slot], fibres[cell, slot]
-            for point in range(F.shape[1]):
-                f = F[cell, point]
+        for point in range(F.shape[1]):
+            f = F[cell, point]
+            own = numbers[cell if cells else 0, point if points else 0]
+            for slot in range(level.shape[1]):
+                T, N = own[slot if slots else 0, 0] * level[cell, slot], fibres[cell, slot]
                 for i in range(3):
                     along = T * (f[i, 0] * N[0] + f[i, 1] * N[1] + f[i, 2] * N[2])
                     for j in range(3):
@@ -242,13 +240,19 @@ def constant_stress(F: FloatArray, level: FloatArray, fibres: FloatArray, out: F
 
 
 @compiled
-def constant_moduli(level: FloatArray, fibres: FloatArray, factor: float, out: FloatArray) -> None:
+def constant_moduli(
+    F: Array, rate: Array, numbers: Array, fibres: Array, level: Array,
+    factors: tuple[float, float], out: Array,
+) -> None:  # fmt: skip
     """Add factor dP/dF of `constant_stress` to out, shape (m, q, 9, 9), Pa."""
-    for cell in range(out.shape[0]):
-        for slot in range(level.shape[1]):
-            T, N = factor * level[cell, slot], fibres[cell, slot]
-            for point in range(out.shape[1]):
+    factor = factors[0]
+    cells, points, slots = numbers.shape[0] > 1, numbers.shape[1] > 1, numbers.shape[2] > 1
+    for cell in range(F.shape[0]):
+        for point in range(F.shape[1]):
+            own = numbers[cell if cells else 0, point if points else 0]
+            for slot in range(level.shape[1]):
+                T, N = own[slot if slots else 0, 0] * level[cell, slot], fibres[cell, slot]
                 for i in range(3):
                     for j in range(3):
                         for m in range(3):
-                            out[cell, point, 3 * i + j, 3 * i + m] += T * N[j] * N[m]
+                            out[cell, point, 3 * i + j, 3 * i + m] += factor * T * N[j] * N[m]

@@ -29,7 +29,7 @@ DENSE_SIZE = 400
 
 #: Maps the right-hand sides (momentum of free components, constraints) to (velocity, multipliers),
 #: of shapes (3f,) and (c,), or (3f, k) and (c, k).
-Solver = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+SaddleSolver = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 
 class Saddle:
@@ -42,12 +42,12 @@ class Saddle:
 
     def __init__(self, model: Model):
         self.model = model
-        self.free, self.cells = 3 * len(model.free), model.constraint_count
+        self.free, self.cells = 3 * len(model.numbering.free), model.constraints.count
         self.dense = self.free + self.cells <= DENSE_SIZE
         if not self.dense:
             self._build_pattern()
 
-    def factor(self, matrices: list[FloatArray], gradients: list[FloatArray]) -> Solver:
+    def factor(self, matrices: list[FloatArray], gradients: list[FloatArray]) -> SaddleSolver:
         """Factor the matrix of these element matrices (m, 3k, 3k) and gradients (m, k, 3)."""
         factor = self._dense if self.dense else self._sparse
         solve = factor(matrices, gradients)
@@ -63,7 +63,7 @@ class Saddle:
     ) -> Callable[[FloatArray], FloatArray]:
         size, free = self.free + self.cells, self.free
         matrix = np.zeros((size, size))
-        for dofs, part in zip(self.model.block_dofs, matrices, strict=True):
+        for dofs, part in zip(self.model.numbering.part_dofs, matrices, strict=True):
             points.scatter_dense(part, dofs, matrix)
         G = dense_gradient(self.model, gradients)
         matrix[free:, :free] = G
@@ -89,10 +89,10 @@ class Saddle:
 
     def _build_pattern(self) -> None:
         """Sparsity, and the place of every entry of the element matrices in it."""
-        pairs = [_pairs(dofs, dofs) for dofs in self.model.block_dofs]
+        pairs = [_pairs(dofs, dofs) for dofs in self.model.numbering.part_dofs]
         gradient_pairs = []
-        for block in self.model.constrained:
-            dofs = self.model.dofs[block.cells]  # (m, k, 3), like the gradients
+        for block in self.model.constraints.parts:
+            dofs = self.model.numbering.dofs[block.cells]  # (m, k, 3), like the gradients
             number = np.arange(block.numbers.start, block.numbers.stop) + self.free
             row = np.broadcast_to(number[:, None, None], dofs.shape)
             gradient_pairs.append((np.where(dofs >= 0, row, -1), dofs))

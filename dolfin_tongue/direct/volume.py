@@ -10,7 +10,7 @@ import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.compiled import compiled
-from dolfin_tongue.direct.elements import ElementKind
+from dolfin_tongue.body.cells import CellKind
 
 
 @compiled
@@ -124,7 +124,7 @@ def add_volume_hessians(
                 out[cell, k * count + b, j * count + a] += part
 
 
-def element_volume(kind: ElementKind, corners: FloatArray) -> float:
+def element_volume(kind: CellKind, corners: FloatArray) -> float:
     """Volume of one element, m3, from its node positions of shape (k, 3), m."""
     cells = np.arange(kind.node_count)[None]
     value = np.empty(1)
@@ -132,14 +132,14 @@ def element_volume(kind: ElementKind, corners: FloatArray) -> float:
     return float(value[0])
 
 
-def element_gradient(kind: ElementKind, corners: FloatArray) -> FloatArray:
+def element_gradient(kind: CellKind, corners: FloatArray) -> FloatArray:
     """Gradient (96) of the volume of one element, shape (k, 3), m2."""
     out = np.empty((1, *corners.shape))
     volume_gradients(corners, np.arange(kind.node_count)[None], *kind.triples, out)
     return out[0]
 
 
-def element_hessian(kind: ElementKind, corners: FloatArray) -> FloatArray:
+def element_hessian(kind: CellKind, corners: FloatArray) -> FloatArray:
     """Hessian (101) of the volume of one element, shape (k, 3, k, 3), m."""
     count = kind.node_count
     out = np.zeros((1, 3 * count, 3 * count))

@@ -9,10 +9,12 @@ import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import ufl
 from dolfinx import fem
 
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import TongueError
 
 #: Longest wait for a form that another process compiles, s.
@@ -37,27 +39,28 @@ def cache_folder() -> Path:
 
 def compile_form(form: ufl.Form) -> fem.Form:
     """Compile a form with optimised C; loads it from the cache where it was compiled before."""
-    folder = cache_folder()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise TongueError(f"no folder for compiled forms: {error}; set XDG_CACHE_HOME") from error
-    options = {
-        "cache_dir": str(folder),
-        "timeout": COMPILATION,
-        "cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", "-g0"],
-    }
-    with _shared(folder):
+    with _cache() as options:
         return fem.form(form, jit_options=options)
 
 
+def compile_expression(expression: Any, points: FloatArray) -> fem.Expression:
+    """Compile an expression at points of the reference cell, shape (q, 3)."""
+    with _cache() as options:
+        return fem.Expression(expression, points, jit_options=options)
+
+
 @contextmanager
-def _shared(folder: Path) -> Iterator[None]:
+def _cache() -> Iterator[dict[str, Any]]:
     """Use the cache together with other processes; drop what a killed compilation left half-done.
 
     The form compiler takes a source without its ``.cached`` mark for the work of another process
     and waits for it. Only a process that finds the cache unused can know that nobody is at work.
     """
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TongueError(f"no folder for compiled forms: {error}; set XDG_CACHE_HOME") from error
     with (folder / ".lock").open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -68,4 +71,8 @@ def _shared(folder: Path) -> Iterator[None]:
                 if not source.with_name(source.name + ".cached").exists():
                     source.unlink()
         fcntl.flock(lock, fcntl.LOCK_SH)
-        yield
+        yield {
+            "cache_dir": str(folder),
+            "timeout": COMPILATION,
+            "cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", "-g0"],
+        }

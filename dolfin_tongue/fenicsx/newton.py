@@ -8,15 +8,14 @@ contracts too slowly, so that it falls back to full Newton by itself where that 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from math import isclose
 
 import numpy as np
 from petsc4py import PETSc
 
 from dolfin_tongue.base.arrays import FloatArray
-from dolfin_tongue.base.errors import OutOfRange, require_positive
 from dolfin_tongue.fenicsx.system import System
+from dolfin_tongue.fenicsx.tolerances import Tolerances
 
 Reason = PETSc.SNES.ConvergedReason
 _NAMES = {value: name for name, value in vars(Reason).items() if isinstance(value, int)}
@@ -48,31 +47,6 @@ def set_options(solver: PETSc.SNES | PETSc.TS, options: Mapping[str, object]) ->
 def reason_name(reason: int) -> str:
     """Return PETSc's name of an SNES reason, e.g. ``DIVERGED_FNORM_NAN``."""
     return _NAMES.get(reason, str(reason))
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """When a Newton iteration is done, in the units of the fields.
-
-    Parameters
-    ----------
-    displacement : largest nodal update, m, > 0.
-    volume : largest relative volume change of any cell, > 0.
-    iterations : at most, per solve.
-    renew_above : the factorisation is renewed when an update is larger than this times the one
-        before; 0 renews it in every iteration (full Newton).
-    """
-
-    displacement: float = 1e-8
-    volume: float = 1e-9
-    iterations: int = 40
-    renew_above: float = 0.25
-
-    def __post_init__(self) -> None:
-        require_positive(self, "m", displacement=self.displacement)
-        require_positive(self, "", volume=self.volume, iterations=self.iterations)
-        if not 0 <= self.renew_above < 1:
-            raise OutOfRange("Tolerances.renew_above", self.renew_above, "in [0, 1)")
 
 
 def _same(first: tuple[float, ...], second: tuple[float, ...]) -> bool:
@@ -107,14 +81,14 @@ class Newton:
         self.residuals, self.iterations, self.factorisations = counts or (0, 0, 0)
         self._raised: BaseException | None = None
         self._positions = system.position_dofs
-        snes.setConvergenceTest(self.careful(self._converged))
+        snes.setConvergenceTest(self.remember_errors(self._converged))
 
     @property
     def counts(self) -> tuple[int, int, int]:
         """Residuals, iterations and factorisations so far."""
         return self.residuals, self.iterations, self.factorisations
 
-    def careful(self, callback: Callable) -> Callable:
+    def remember_errors(self, callback: Callable) -> Callable:
         """Remember what a callback of PETSc raises: PETSc reports an error of its own instead."""
 
         def watched(*arguments: object) -> object:
@@ -167,10 +141,10 @@ class Newton:
         update = snes.getSolutionUpdate().array_r[self._positions]
         size = float(np.abs(update).max())
         residual = snes.getFunction()[0].array_r
-        settled = self.volume_error(residual) <= self.tolerances.volume and all(
-            coupling.settled(residual) for coupling in self.system.couplings
+        converged = self.volume_error(residual) <= self.tolerances.volume and all(
+            coupling.converged(residual) for coupling in self.system.couplings
         )
-        if size <= self.tolerances.displacement and settled:
+        if size <= self.tolerances.displacement and converged:
             return Reason.CONVERGED_SNORM_RELATIVE
         if iteration >= self.tolerances.iterations:
             return Reason.DIVERGED_MAX_IT

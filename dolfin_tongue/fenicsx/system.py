@@ -1,325 +1,268 @@
 """Semi-discrete equations of a scene: G(t, y, y', y'') = 0. There is no dt here.
 
 y = (u, p, unknowns of the couplings): displacement, pressure and, where a scene has them,
-multipliers of sliding nodes and coordinates of rigid bodies.
+multipliers of sliding nodes and coordinates of rigid bodies, in our own `numbering`. G is a sum of
+blocks (UFL forms on the volume and on surfaces) and of couplings (what no form states).
 
-The residual is a pure function of its arguments. The rows of the volume condition and of the held
+The residual is a pure function of its `Arguments`. The rows of the volume condition and of the held
 nodes are kinematic: they are stated for the state at the *end* of a time step, so that every
 accepted state keeps its volumes, while the rows of momentum are stated at the stage of the method.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-import ufl
-from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from petsc4py import PETSc
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import FloatArray, IntArray, sums_at
 from dolfin_tongue.base.errors import BadScene, listing
-from dolfin_tongue.boundary.contact import Contact
-from dolfin_tongue.fenicsx.compile import compile_form
-from dolfin_tongue.fenicsx.couplings import (
-    Arguments,
-    ContactSurface,
-    Coupling,
-    RigidBodies,
-    Shifts,
-    SlidingNodes,
-)
-from dolfin_tongue.fenicsx.fields import CellFields
-from dolfin_tongue.fenicsx.incompressible import pressure_power, volume_condition
-from dolfin_tongue.fenicsx.mesh import mixed_space
-from dolfin_tongue.march.state import State
+from dolfin_tongue.body.state import NOTHING, State
+from dolfin_tongue.control import Instant, Memory
+from dolfin_tongue.fenicsx.arguments import Arguments, Shifts
+from dolfin_tongue.fenicsx.block import Block
+from dolfin_tongue.fenicsx.coupling import Coupling
+from dolfin_tongue.fenicsx.couplings import couplings_of
+from dolfin_tongue.fenicsx.domains import surface_domain, volume_domain
+from dolfin_tongue.fenicsx.numbering import Numbering
+from dolfin_tongue.fenicsx.pairs import pair_of
 from dolfin_tongue.scene.scene import Scene
-from dolfin_tongue.terms.kinematics import Kinematics
-from dolfin_tongue.terms.term import labels_of
+from dolfin_tongue.scene.well_posed import check_pressures, check_static
+from dolfin_tongue.terms.term import FormTerm
 
 
 class System:
-    """Residual and Jacobian of a scene on the mixed space.
+    """Residual and Jacobian of a scene.
 
     Parameters
     ----------
     scene : body, terms, supports.
     dynamic : with inertia and rates; otherwise a static problem with a load factor, in which no
         velocity, no acceleration and no mass exist.
-    pair : displacement and pressure spaces, see `mesh.PAIRS`.
+    pair : displacement and pressure spaces, see `pairs.PAIRS`.
+
+    Attributes
+    ----------
+    size : number of unknowns.
+    position_dofs : unknowns that are positions, with inertia.
+    multiplier_dofs : unknowns of a stage alone, without memory.
     """
 
     def __init__(self, scene: Scene, dynamic: bool, pair: str = "Q1/P0"):
-        scene.check_volumes()
+        check_pressures(scene)
         if not dynamic:
-            scene.check_static()
+            check_static(scene)
         self.scene, self.dynamic = scene, dynamic
-        self.space = mixed_space(scene.body, pair)
-        self.fields = CellFields(self.space)
-        self._build_states()
-        self._build_couplings()
-        self.terms_in_form: list = []
-        residual = self._residual_form()
-        self.residual_form = residual
-        self.jacobian_form = self._jacobian_form(residual)
-        self._residual = compile_form(residual)
-        self._jacobian = compile_form(self.jacobian_form)
-        self._pressure_dofs = self.space.pressure_dofs
-        self._pressure_weights = self._weights_of_pressure()
+        self.numbering = Numbering(scene.body, pair_of(pair))
+        self.blocks = self._blocks()
+        self.couplings: list[Coupling] = couplings_of(scene, self.numbering)
+        self._number_unknowns()
+        self._find_held(pair)
+
+    def _blocks(self) -> list[Block]:
+        """Blocks of the volume and of each surface that terms name."""
+        named = zip(self.scene.labels, self.scene.terms, strict=True)
+        forms = [(label, term) for label, term in named if isinstance(term, FormTerm)]
+        blocks = []
+        for surface in dict.fromkeys([None, *(term.domain for _, term in forms)]):
+            terms = [(label, term) for label, term in forms if term.domain == surface]
+            domain = (
+                volume_domain(self.numbering)
+                if surface is None
+                else surface_domain(self.numbering, surface)
+            )
+            blocks.append(Block(domain, terms, self.dynamic))
+        return blocks
+
+    def _number_unknowns(self) -> None:
+        numbering, empty = self.numbering, np.zeros(0, dtype=np.int64)
+        self.size = numbering.size + sum(coupling.count for coupling in self.couplings)
+        #: Unknowns of sliding nodes and of rigid bodies.
+        self.sliding_dofs = np.concatenate([empty, *(c.multipliers for c in self.couplings)])
+        self.rigid_dofs = np.concatenate([empty, *(c.positions for c in self.couplings)])
+        every = np.arange(numbering.size)
+        self.position_dofs = np.concatenate([every[numbering.displacements], self.rigid_dofs])
+        self.multiplier_dofs = np.concatenate([every[numbering.pressures], self.sliding_dofs])
+
+    def _find_held(self, pair: str) -> None:
+        scene, numbering = self.scene, self.numbering
         held = [support.nodes(scene.body) for support in scene.held]
-        groups = self.space.held(np.concatenate([*held, []]).astype(np.int64))
+        groups = numbering.following(np.concatenate([*held, []]).astype(np.int64))
+        points = np.concatenate([part for part, _ in groups])
         self._held_corners = [corners for _, corners in groups]
-        self._held_dofs = np.concatenate([dofs for dofs, _ in groups]).astype(np.int32)
-        self._held_points = [scene.body.points[part] for part in held]
-        moved = [part.dofs for part in self.couplings if isinstance(part, RigidBodies)]
-        every = np.concatenate([self._held_dofs, *moved])
-        stuck = self.space.cells_of_stuck_pressures(every)
+        self._held_dofs = 3 * points[:, None] + np.arange(3)
+        self._held_places = [scene.body.points[part] for part in held]
+        moved = [part.carried for part in self.couplings]
+        stuck = numbering.cells_of_stuck_pressures(np.concatenate([points, *moved]))
         if stuck.size:
             raise BadScene(
                 f"nothing determines the pressure at a corner of cell(s) {listing(stuck)}: all "
                 f"displacement around it is held; refine the mesh or take another pair than {pair}"
             )
 
-    # -- couplings -----------------------------------------------------------------------------
+    @property
+    def volume(self) -> Block:
+        """The block of the volume."""
+        return self.blocks[0]
 
-    def _build_couplings(self) -> None:
-        """Parts outside the forms, and the numbers of their unknowns."""
-        scene, space = self.scene, self.space
-        contacts = [term for term in scene.terms if isinstance(term, Contact)]
-        named = zip(contacts, labels_of(contacts), strict=True)
-        self.couplings: list[Coupling] = [ContactSurface(x, space, name) for x, name in named]
-        size = space.size
-        for support in scene.sliding:
-            self.couplings.append(SlidingNodes(support, space, size))
-            size += len(self.couplings[-1].multipliers)
-        self.size = size
-        if scene.rigid_bodies:
-            self.couplings.append(RigidBodies(scene, space, size))
-            self.size += len(self.couplings[-1].positions)
-        empty = np.zeros(0, dtype=np.int64)
-        #: Unknowns of sliding nodes and of rigid bodies.
-        self.sliding_dofs = np.concatenate([empty, *(c.multipliers for c in self.couplings)])
-        self.rigid_dofs = np.concatenate([empty, *(c.positions for c in self.couplings)])
-        #: Unknowns that are positions, with inertia; and those of a stage alone, without memory.
-        self.position_dofs = np.concatenate([space.all_displacement_dofs.ravel(), self.rigid_dofs])
-        self.multiplier_dofs = np.concatenate([space.pressure_dofs, self.sliding_dofs])
+    # -- arguments ---------------------------------------------------------------------------------
 
-    # -- forms ---------------------------------------------------------------------------------
+    def at_state(self, state: State, now: Instant | None = None) -> Arguments:
+        """Arguments of a state without acceleration; its end is itself.
 
-    def _build_states(self) -> None:
-        """Coefficients for the states the residual depends on, and the constants of the method."""
-        grid, space = self.space.mesh, self.space.space
-        degree = self.space.pair.quadrature_degree
-        self.dx = ufl.Measure("dx", grid, metadata={"quadrature_degree": degree})
-        self.state = fem.Function(space, name="state")
-        self.load: Any = None if self.dynamic else fem.Constant(grid, 1.0)
-        self.end_state = fem.Function(space, name="end") if self.dynamic else self.state
-        self.rate: Any = fem.Function(space, name="rate") if self.dynamic else None
-        self.acceleration: Any = fem.Function(space, name="acceleration") if self.dynamic else None
-        self._shifts = [fem.Constant(grid, 0.0) for _ in range(3)] if self.dynamic else []
+        Parameters
+        ----------
+        state : any.
+        now : time and memory, if not those of the state.
+        """
+        y, rate = self.vectors(state)
+        now = Instant(state.time, state.memory) if now is None else now
+        return Arguments(now, now.time, y, rate, np.zeros_like(y), y, state.load)
 
-    def number(self, value: float) -> fem.Constant:
-        """Return a constant of the forms: another value needs no new compilation."""
-        return fem.Constant(self.space.mesh, float(value))
+    # -- residual and Jacobian ---------------------------------------------------------------------
 
-    def kinematics(self, state: fem.Function, rate: fem.Function | None) -> Kinematics:
-        """Kinematics of a mixed state (and its rate)."""
-        velocity = None if rate is None else ufl.split(rate)[0]
-        return Kinematics(ufl.split(state)[0], self.dx, self.number, velocity, self.load)
-
-    def _residual_form(self) -> ufl.Form:
-        """Sum of the virtual powers of all terms, inertia, pressure and volume condition."""
-        test_u, test_p = ufl.TestFunctions(self.space.space)
-        kin = self.kinematics(self.state, self.rate)
-        form = pressure_power(kin, ufl.split(self.state)[1], test_u)
-        for term in self.scene.terms:
-            part = term.virtual_power(kin, self.fields, test_u)
-            if part is not None:
-                form += part
-                self.terms_in_form.append(term)
-        if self.dynamic:
-            density = self.number(self.scene.body.density)
-            acceleration = ufl.split(self.acceleration)[0]
-            form += density * ufl.inner(acceleration, test_u) * self.dx  # (40)
-        end = self.kinematics(self.end_state, None) if self.dynamic else kin
-        return form + volume_condition(end, test_p)
-
-    def _jacobian_form(self, residual: ufl.Form) -> ufl.Form:
-        """Differentiate by the state, plus shifted derivatives by those other states that occur."""
-        trial = ufl.TrialFunction(self.space.space)
-        form = ufl.derivative(residual, self.state, trial)
-        if self.dynamic:
-            others = (self.rate, self.acceleration, self.end_state)
-            present = residual.coefficients()
-            for shift, other in zip(self._shifts, others, strict=True):
-                if other in present:
-                    form += shift * ufl.derivative(residual, other, trial)
-        return form
-
-    # -- residual and Jacobian -----------------------------------------------------------------
-
-    def set_state(
-        self,
-        time: float,
-        state: FloatArray,
-        rate: FloatArray | None = None,
-        acceleration: FloatArray | None = None,
-        end_state: FloatArray | None = None,
-    ) -> None:
-        """Set the arguments (t, y, y', y'', y at the end of the step); mixed arrays."""
-        self.fields.set_time(time)
-        inside = slice(self.space.size)
-        self.state.x.array[:] = state[inside]
-        if self.dynamic:
-            assert rate is not None and acceleration is not None and end_state is not None
-            self.rate.x.array[:] = rate[inside]
-            self.acceleration.x.array[:] = acceleration[inside]
-            self.end_state.x.array[:] = end_state[inside]
-        self._arrays = (time, state, rate, acceleration, end_state)
-
-    def arguments(self, time_end: float) -> Arguments:
-        """Arguments that were set, for the couplings."""
-        time, state, rate, acceleration, end = self._arrays
-        if rate is None or acceleration is None or end is None:
-            rest = np.zeros_like(state)
-            return Arguments(time, time_end, state, rest, rest, state, float(self.load.value))
-        return Arguments(time, time_end, state, rate, acceleration, end)
-
-    def residual(self, time_end: float, out: FloatArray) -> None:
-        """Residual at the arguments that were set; N in rows of u, m3 in rows of p."""
-        out[:] = 0.0
-        fem.assemble_vector(out[: self.space.size], self._residual)
-        if self.couplings:
-            at = self.arguments(time_end)
-            for coupling in self.couplings:
-                coupling.add_residual(at, out)
-        if self._held_dofs.size:
-            out[self._held_dofs] = self.end_state.x.array[self._held_dofs] - self.held_displacement(
-                time_end
-            )
-
-    def reactions(self, time_end: float) -> FloatArray:
-        """Residual with the rows of momentum of held nodes too: what supports exert on them, N."""
-        out, at = np.zeros(self.size), self.arguments(time_end)
-        fem.assemble_vector(out[: self.space.size], self._residual)
+    def residual(self, at: Arguments, out: FloatArray) -> None:
+        """Write the residual; N in rows of u, m3 in rows of p."""
+        self._forms(at, out)
         for coupling in self.couplings:
-            if not isinstance(coupling, RigidBodies):
+            coupling.add_residual(at, out)
+        if self._held_dofs.size:
+            out[self._held_dofs] = at.end[self._held_dofs] - self._held_displacement(at)
+
+    def _forms(self, at: Arguments, out: FloatArray) -> None:
+        """Write the part of the residual that is stated by forms."""
+        first, *others = self.blocks
+        out[:] = first.residual(at, self.size)
+        for block in others:
+            out += block.residual(at, self.size)
+
+    def _held_displacement(self, at: Arguments) -> FloatArray:
+        """Prescribed displacement of the held points at the end, shape (k, 3), m."""
+        supports = zip(self.scene.held, self._held_places, strict=True)
+        nodes = np.concatenate([part.displacement(x, at.time_end) for part, x in supports])
+        parts = [nodes[corners].mean(axis=1) for corners in self._held_corners[1:]]
+        moved = np.concatenate([nodes, *parts]) if parts else nodes
+        return moved if at.load == 1.0 else at.load * moved
+
+    def reactions(self, at: Arguments) -> FloatArray:
+        """Residual with the rows of momentum of held nodes too: what supports exert on them, N."""
+        out = np.zeros(self.size)
+        self._forms(at, out)
+        for coupling in self.couplings:
+            if not coupling.gathers:
                 coupling.add_residual(at, out)
         return out
 
-    def support_work(self, time: float, way: FloatArray) -> float:
-        """Work of moving supports on a small way of the mixed unknowns, J."""
-        at, rows = self.arguments(time), self.reactions(time)
+    def support_work(self, at: Arguments, way: FloatArray) -> float:
+        """Work of moving supports on a small way of the unknowns, J."""
+        rows = self.reactions(at)
         held = float(np.sum(rows[self._held_dofs] * way[self._held_dofs]))
-        bodies = [part for part in self.couplings if isinstance(part, RigidBodies)]
-        return held + sum(part.work(at, rows, way) for part in bodies)
+        return held + sum(part.work(at, rows, way) for part in self.couplings)
 
-    def jacobian(
-        self,
-        matrix: PETSc.Mat,
-        shifts: tuple[float, float, float] = (0, 0, 0),
-        time_end: float = 0.0,
-    ) -> None:
-        """Jacobian at the arguments that were set: dG/dy + shifts . dG/d(y', y'', y_end)."""
-        for constant, shift in zip(self._shifts, shifts, strict=False):
-            constant.value = shift
-        form_matrix = self._form_matrix if self.couplings else matrix
-        form_matrix.zeroEntries()
-        assemble_matrix(form_matrix, self._jacobian)
-        form_matrix.assemble()
-        end = shifts[2] if self.dynamic else 1.0
+    @cached_property
+    def _pattern(self) -> sp.csr_array:
+        """Places of all entries of the Jacobian of the forms, and of its diagonal."""
+        diagonal = np.arange(self.size)
+        rows = np.concatenate([diagonal, *(block.entries[0] for block in self.blocks)])
+        columns = np.concatenate([diagonal, *(block.entries[1] for block in self.blocks)])
+        ones = np.ones(len(rows))
+        pattern = sp.coo_array((ones, (rows, columns)), shape=(self.size, self.size)).tocsr()
+        pattern.sort_indices()
+        pattern.data[:] = 1.0
+        return pattern
+
+    @cached_property
+    def _places(self) -> list[IntArray]:
+        """For each block the place of its entries in the data of the pattern."""
+        pattern, size = self._pattern, np.int64(self.size)
+        key = np.repeat(np.arange(size), np.diff(pattern.indptr)) * size + pattern.indices
+        return [np.searchsorted(key, row * size + column) for row, column in self._entries]
+
+    @property
+    def _entries(self) -> list[tuple[IntArray, IntArray]]:
+        return [block.entries for block in self.blocks]
+
+    def jacobian(self, at: Arguments, shifts: Shifts, matrix: PETSc.Mat) -> None:
+        """Write dG/dy + shifts . dG/d(y', y'', y_end) into a matrix of `new_matrix`."""
+        total, count = self._pattern, self._pattern.nnz
+        data = np.zeros(count)
+        for block, places in zip(self.blocks, self._places, strict=True):
+            data += sums_at(places, block.tangent(at, shifts), count)
+        total = sp.csr_array((data, total.indices, total.indptr), shape=total.shape)
         if self.couplings:
-            self._couple(matrix, Shifts(shifts[0], shifts[1], end), time_end)
-        if self._held_dofs.size:
-            matrix.zeroRows(self._held_dofs.ravel(), diag=end)
-
-    def _couple(self, matrix: PETSc.Mat, shifts: Shifts, time_end: float) -> None:
-        """Add the couplings to the matrix of the forms."""
-        at, rows = self.arguments(time_end), np.zeros(self.size)
-        fem.assemble_vector(rows[: self.space.size], self._residual)
-        total = self._embedded(self._form_matrix)
-        for coupling in self.couplings:
-            total = coupling.with_tangent(total, at, shifts, rows)
-            coupling.add_residual(at, rows)
-        total = total.tocsr()
-        matrix.zeroEntries()
-        matrix.setValuesCSR(*_places(total), total.data)
+            rows = np.zeros(self.size)
+            self._forms(at, rows)
+            for coupling in self.couplings:
+                total = coupling.with_tangent(total, at, shifts, rows)
+                coupling.add_residual(at, rows)
+            total = total.tocsr()
+            matrix.zeroEntries()
+        matrix.setValuesCSR(*_integers(total), total.data)
         matrix.assemble()
-
-    def _embedded(self, matrix: PETSc.Mat) -> sp.csr_array:
-        """Matrix of the forms with empty rows and columns of the couplings."""
-        indptr, indices, values = matrix.getValuesCSR()
-        indptr = np.pad(indptr, (0, self.size - self.space.size), mode="edge")
-        return sp.csr_array((values, indices, indptr), shape=(self.size, self.size))
+        if self._held_dofs.size:
+            matrix.zeroRows(self._held_dofs.ravel().astype(PETSc.IntType), diag=shifts.end)
 
     def new_matrix(self) -> PETSc.Mat:
         """Empty matrix with the sparsity of the Jacobian."""
-        matrix = create_matrix(self._jacobian)
-        if self.couplings:
-            assemble_matrix(matrix, self._jacobian)  # PETSc drops places that were never filled
-            matrix.assemble()
-            self._form_matrix, entries = matrix, self._embedded(matrix)
-            entries.data[:] = 1.0
-            for coupling in self.couplings:
-                entries = coupling.pattern(entries)
-            pattern = (entries + sp.eye_array(self.size)).tocsr()
-            pattern.sort_indices()
-            csr = (*_places(pattern), np.zeros(pattern.nnz))
-            matrix = PETSc.Mat().createAIJ(self.size, csr=csr, comm=PETSc.COMM_SELF)
+        pattern = self._pattern
+        for coupling in self.couplings:
+            pattern = coupling.pattern(pattern)
+        pattern = pattern.tocsr()
+        pattern.sort_indices()
+        csr = (*_integers(pattern), np.zeros(pattern.nnz))
+        matrix = PETSc.Mat().createAIJ(self.size, csr=csr, comm=PETSc.COMM_SELF)
         matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         return matrix
 
-    def held_displacement(self, time: float) -> FloatArray:
-        """Prescribed displacement of the held dofs, shape (number of points, 3), m."""
-        supports = zip(self.scene.held, self._held_points, strict=True)
-        nodes = np.concatenate([support.displacement(x, time) for support, x in supports])
-        if self.space.nodal_only:
-            return nodes
-        return np.concatenate([nodes[corners].mean(axis=1) for corners in self._held_corners])
+    # -- volumes -----------------------------------------------------------------------------------
 
     def volume_change(self, residual: FloatArray) -> FloatArray:
-        """Relative volume change that each pressure dof sees, from a residual vector.
+        """Relative volume change that each pressure sees, from a residual vector.
 
         For Q1/P0 that is the relative volume change of every cell, shape (m,), in the body's order.
         """
-        return -residual[self._pressure_dofs] / self._pressure_weights
+        return -residual[self.numbering.pressures] / self._pressure_weights
 
-    def _weights_of_pressure(self) -> FloatArray:
+    @cached_property
+    def _pressure_weights(self) -> FloatArray:
         """Integral of q^2 of each pressure shape function, m3; for Q1/P0 the cells' volumes."""
-        if self.space.pair.pressure == ("DG", 0):
+        if self.numbering.pair.pressure == ("DG", 0):
             return self.scene.body.volumes
-        _, trial_p = ufl.TrialFunctions(self.space.space)
-        _, test_p = ufl.TestFunctions(self.space.space)
-        matrix = fem.assemble_matrix(compile_form(trial_p * test_p * self.dx))
-        return matrix.to_scipy().diagonal()[self._pressure_dofs]
+        return self.volume.pressure_weights[self.numbering.pressures]
 
-    # -- between mixed arrays and arrays in the body's order -----------------------------------
+    # -- between vectors and states ----------------------------------------------------------------
 
-    def displacement(self, mixed: FloatArray) -> FloatArray:
-        """Displacement (or velocity) of the nodes from a mixed array, shape (n, 3)."""
-        return mixed[self.space.displacement_dofs]
-
-    def pressure(self, mixed: FloatArray) -> FloatArray:
-        """Pressure in the middle of the cells from a mixed array, shape (m,), Pa."""
-        return self.space.cell_pressure(mixed)
+    def displacement(self, y: FloatArray) -> FloatArray:
+        """Displacement (or velocity) of the nodes from a vector of all unknowns, shape (n, 3)."""
+        return y[self.numbering.nodes].reshape(-1, 3)
 
     def state_of(
-        self, time: float, y: FloatArray, rate: FloatArray, step: float = 0.0, iterations: int = 0
+        self, now: Instant, y: FloatArray, rate: FloatArray, step: float = 0.0, iterations: int = 0
     ) -> State:
-        """State in the body's order from the mixed arrays of y and y'."""
-        unknowns = None if self.space.nodal_only else (y.copy(), rate.copy())
-        fields = (self.displacement(y), self.displacement(rate), self.pressure(y))
+        """State in the body's order from vectors of y and y'."""
+        fields = (self.displacement(y).copy(), self.displacement(rate).copy())
+        unknowns = None if self.numbering.nodal_only else (y.copy(), rate.copy())
         rigid = (y[self.rigid_dofs].reshape(-1, 3), rate[self.rigid_dofs].reshape(-1, 3))
-        return State(time, *fields, step, iterations, unknowns, *rigid, y[self.sliding_dofs])
+        return State(
+            now.time, *fields, self.numbering.cell_pressure(y), step, iterations, unknowns, *rigid,
+            y[self.sliding_dofs], memory=now.memory,
+        )  # fmt: skip
 
     def vectors(self, state: State) -> tuple[FloatArray, FloatArray]:
-        """Mixed arrays of y and y' of a state; new ones."""
-        if state.unknowns is not None:
+        """Vectors of y and y' of a state; new ones.
+
+        Raises
+        ------
+        BadScene : a state of another body or pair of spaces.
+        """
+        if state.unknowns is not None and not self.numbering.nodal_only:
             y, rate = state.unknowns
+            if len(y) != self.size:
+                raise BadScene(f"the state has {len(y)} unknowns, and the scene {self.size}")
             return y.copy(), rate.copy()
-        y, rate = self.mixed(state.displacement, state.pressure), self.mixed(state.velocity)
+        y, rate = self.vector(state.displacement, state.pressure), self.vector(state.velocity)
         if self.rigid_dofs.size and state.rigid.size:
             y[self.rigid_dofs] = state.rigid.ravel()
             rate[self.rigid_dofs] = state.rigid_rate.ravel()
@@ -327,23 +270,38 @@ class System:
             y[self.sliding_dofs] = state.sliding
         return y, rate
 
-    def mixed(self, displacement: FloatArray, pressure: FloatArray | float = 0.0) -> FloatArray:
-        """Mixed array from displacement, shape (n, 3), and pressure, shape (m,)."""
+    def vector(self, displacement: FloatArray, pressure: FloatArray | float = 0.0) -> FloatArray:
+        """Vector of displacements of the nodes, shape (n, 3), and pressures, shape (m,).
+
+        Points of a quadratic displacement between nodes move with the mean of their corners.
+        """
         body = self.scene.body
         if displacement.shape != body.points.shape:
             raise BadScene(
                 f"a displacement of shape {body.points.shape} is needed, not {displacement.shape}"
             )
-        array = np.zeros(self.size)
-        if not self.space.nodal_only:
-            if np.any(displacement):
-                raise BadScene("nodal values do not determine a quadratic displacement")
-            return array  # at rest
-        array[self.space.displacement_dofs] = displacement
-        array[self.space.pressure_dofs] = pressure
-        return array
+        y = np.zeros(self.size)
+        corners = self.numbering.corners.values()
+        y[self.numbering.displacements] = np.concatenate(
+            [displacement[rows].mean(axis=1) for rows in corners]
+        ).ravel()
+        y[self.numbering.pressures] = self.numbering.pressures_of(pressure)
+        return y
+
+    # -- memory ------------------------------------------------------------------------------------
+
+    def sides(self, state: State) -> Memory:
+        """Which points of a contact are behind a sheet or beyond its reach, by the contact's name.
+
+        A step judges its points by where they were when it began.
+        """
+        parts = [coupling for coupling in self.couplings if coupling.has_sides]
+        if not parts:
+            return NOTHING
+        y, _ = self.vectors(state)
+        return {"sides": {part.label: part.sides(state.time, y, state.load) for part in parts}}
 
 
-def _places(matrix: sp.csr_array) -> tuple[IntArray, IntArray]:
+def _integers(matrix: sp.csr_array) -> tuple[IntArray, IntArray]:
     """Row starts and columns in the integers of PETSc."""
     return matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType)

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import BadScene
-from dolfin_tongue.march.state import State
+from dolfin_tongue.body.state import State
 
 
 class Solver(Protocol):

@@ -5,28 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
-from dolfin_tongue.base.errors import listing
+from dolfin_tongue.base.errors import Diagnosis, listing
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.body.shape import VERY_LONG, largest_stretches, volume_ratios
+from dolfin_tongue.body.shape import VERY_LONG, largest_stretches, smallest_ratios
 
 
-def where_and_why(body: Body, displacement: FloatArray) -> str:
+def diagnosis(body: Body, displacement: FloatArray) -> Diagnosis:
     """Name the most distorted cells of the last accepted state and what may help."""
-    ratios = volume_ratios(body.points, displacement, body.cells).min(axis=1)
+    ratios = smallest_ratios(body, displacement)
     worst = np.argsort(ratios)[:5]
-    cells = listing(f"{cell} (smallest det F {ratios[cell]:.3f})" for cell in worst)
-    stretch = largest_stretches(body.points, displacement, body.cells)
+    stretch = largest_stretches(body, displacement)
     longest = int(stretch.argmax())
     if ratios.min() < 0.3:
-        cause = "cells are close to inversion: lower the activation or refine the mesh there"
+        advice = "cells are close to inversion: lower the activation or refine the mesh there"
     elif stretch[longest] > VERY_LONG:
-        cause = (
+        advice = (
             f"cell {longest} is stretched {stretch[longest]:.2f} times, where stiffening tissue "
             "is steep and may overflow: lower the load or take a smaller dt"
         )
     else:
-        cause = (
+        advice = (
             "no cell is near inversion: try a smaller dt, a slower ramp of the activations or some "
             "Viscosity"
         )
-    return f"Most distorted cells at the last accepted state: {cells}; {cause}"
+    cells = listing(f"{cell} (smallest det F {ratios[cell]:.3f})" for cell in worst)
+    text = f"Most distorted cells at the last accepted state: {cells}; {advice}"
+    return Diagnosis(text, tuple(map(int, worst)), float(ratios.min()), float(stretch[longest]))

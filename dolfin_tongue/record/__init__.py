@@ -1,1 +1,5 @@
-"""Runs in time: observed, written to files as they go, resumed."""
+"""Runs in time: observed, described, written to files as they go, resumed, read back."""
+
+from dolfin_tongue.record.run import Run, load_run, simulate
+
+__all__ = ["Run", "load_run", "simulate"]

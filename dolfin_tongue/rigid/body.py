@@ -7,12 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
-from dolfin_tongue.base.errors import BadScene, require_positive
-from dolfin_tongue.body.body import LARGEST_SIZE, Body
+from dolfin_tongue.base.arrays import BoolArray, FloatArray, IntArray
+from dolfin_tongue.base.errors import BadScene, require_positive, require_vector
+from dolfin_tongue.base.units import LARGEST_SIZE
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.control import Timed
 from dolfin_tongue.control.motion import Motion, check_motion
-from dolfin_tongue.rigid.forces import SKULL, Line, PointForce, RigidForce, Turning
-from dolfin_tongue.terms.term import Support, require_vector
+from dolfin_tongue.rigid.forces import SKULL, Line, OwnForce, RigidForce
+from dolfin_tongue.terms.labels import numbered
+from dolfin_tongue.terms.support import Support
 
 Vector = tuple[float, float, float]
 
@@ -73,7 +76,7 @@ class RigidBody(Support):
             require_vector(self, "pivot", self.pivot)
         if not (
             isinstance(self.forces, tuple | list)
-            and all(isinstance(force, (PointForce, Turning, Line)) for force in self.forces)
+            and all(isinstance(force, OwnForce | Line) for force in self.forces)
         ):
             raise BadScene(
                 f"{self.name}: forces must be a tuple of them, e.g. (Moment(0.1),); for a law of "
@@ -88,11 +91,6 @@ class RigidBody(Support):
             if coordinate not in COORDINATES:
                 raise BadScene(
                     f"{self.name}: no coordinate {coordinate!r}; there are {', '.join(COORDINATES)}"
-                )
-            if not isinstance(motion, Motion):
-                raise BadScene(
-                    f"{self.name}: the motion of {coordinate!r} must be one, e.g. Still() or "
-                    f"SmoothMove(0.01), not {motion!r}"
                 )
             check_motion(f"{self.name}: the motion of {coordinate!r}", motion)
 
@@ -138,7 +136,7 @@ class RigidBody(Support):
         return np.atleast_2d(points) - self.reference
 
     @property
-    def given(self) -> FloatArray:
+    def given(self) -> BoolArray:
         """Mask of the prescribed coordinates, shape (3,)."""
         return np.array([name in self.motion for name in COORDINATES])
 
@@ -154,13 +152,12 @@ class RigidBody(Support):
         return result
 
     @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Those of its motion and forces, s."""
-        times = [part.breakpoints for part in self.motion.values()]
-        times += [force.breakpoints for force in self.forces]
-        return tuple(t for part in times for t in part)
+    def named_forces(self) -> list[tuple[str, RigidForce]]:
+        """Its forces, each with a name of its own."""
+        names = numbered([type(force).__name__ for force in self.forces])
+        return list(zip(names, self.forces, strict=True))
 
     @property
-    def jumps(self) -> tuple[float, ...]:
-        """Those of its forces, s."""
-        return tuple(t for force in self.forces for t in force.jumps)
+    def parts(self) -> Mapping[str, Timed]:
+        """Its motion and forces."""
+        return {**self.motion, **dict(self.named_forces)}

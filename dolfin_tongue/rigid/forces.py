@@ -1,29 +1,31 @@
 """Forces on rigid bodies as functions of state and time: F and N of (61), (62).
 
-Each states a size (of a given force, a moment, a tension) and, where it depends on the state, its
-derivatives; `loads.Loads` turns them into forces and moments on the coordinates.
+Each states a size (of a given force, a moment, a tension) and its derivatives; `loads.Loads` turns
+them into forces and moments on the coordinates.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray
 from dolfin_tongue.base.errors import (
     BadScene,
     OutOfRange,
+    is_number,
     require_finite,
     require_not_negative,
     require_positive,
+    require_vector,
 )
-from dolfin_tongue.constitutive.active import StressMobilisation
-from dolfin_tongue.control import Control
+from dolfin_tongue.control import Control, Instant, RememberingControl, Timed
 from dolfin_tongue.control.sources import require_activation
-from dolfin_tongue.terms.term import require_vector
+from dolfin_tongue.rigid import plane
+from dolfin_tongue.terms.mobilisation import StressMobilisation
 
 Vector = tuple[float, float, float]
 
@@ -31,18 +33,13 @@ Vector = tuple[float, float, float]
 SKULL = "skull"
 
 
-class RigidForce:
-    """A force on one rigid body, or between two."""
+class RigidForce(Timed):
+    """A force on one rigid body (`OwnForce`), or between two (`Line`)."""
 
     @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Times (s) at which the force is not smooth."""
-        return ()
-
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Those of the break points at which it jumps."""
-        return ()
+    def resists(self) -> BoolArray:
+        """Which motions of its body (x, z, angle) it may resist by its size, shape (3,)."""
+        return np.zeros(3, dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -51,29 +48,47 @@ class _Controlled(RigidForce):
 
     control: Control | None = field(default=None, kw_only=True)
 
-    def _level(self, time: float) -> float:
-        return 1.0 if self.control is None else self.control(time)
+    def _level(self, now: Instant) -> float:
+        return 1.0 if self.control is None else self.control.at(now.of("control"))
 
     def _check_control(self) -> None:
         control = self.control
-        if control is not None and (isinstance(control, type) or not isinstance(control, Control)):
+        if control is not None and not isinstance(control, Control):
             raise BadScene(
                 f"{type(self).__name__}.control must be a control, e.g. Ramp(1.0), not {control!r}"
             )
 
     @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Those of the control, s."""
-        return () if self.control is None else self.control.breakpoints
+    def parts(self) -> Mapping[str, Timed]:
+        """The control."""
+        return {} if self.control is None else {"control": self.control}
 
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Those of the control, s."""
-        return () if self.control is None else self.control.jumps
+
+class OwnForce(RigidForce, ABC):
+    """A force that depends on the coordinates of its body alone."""
+
+    @abstractmethod
+    def generalised(
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> FloatArray:
+        """Force on (x, z, angle), N and N m, shape (3,).
+
+        Parameters
+        ----------
+        now : time and memory.
+        q, v : coordinates of the body and their rates, shape (3,).
+        reference : place of its reference point at rest, m.
+        """
+
+    @abstractmethod
+    def tangents(
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of `generalised` by q and by v, (3, 3) each."""
 
 
 @dataclass(frozen=True)
-class PointForce(_Controlled):
+class PointForce(_Controlled, OwnForce):
     """A given force on a point of the body; it keeps its direction in space.
 
     Parameters
@@ -91,23 +106,34 @@ class PointForce(_Controlled):
         require_vector(self, "force", self.force)
         self._check_control()
 
-    def at(self, time: float) -> FloatArray:
-        """Force at a time, N."""
-        return self._level(time) * np.asarray(self.force, dtype=float)
+    @property
+    def resists(self) -> BoolArray:
+        """A turn."""
+        return np.array([False, False, True])
 
+    def _arm(self, reference: FloatArray) -> FloatArray:
+        return (np.asarray(self.point, dtype=float) - reference)[None]
 
-class Turning(RigidForce, ABC):
-    """A moment that depends on the coordinates of its body alone."""
-
-    @abstractmethod
     def generalised(
-        self, time: float, q: FloatArray, v: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Force on (x, z, angle), N and N m, with its derivatives by q and v, each (3, 3)."""
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> FloatArray:
+        """Return the force, and its moment about the reference point."""
+        push = self._level(now) * np.asarray(self.force, dtype=float)
+        r = plane.turned(self._arm(reference), q[2])[0]
+        return np.array([push[0], push[2], r[2] * push[0] - r[0] * push[2]])
+
+    def tangents(
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the turning of its arm."""
+        by_q, by_v = np.zeros((2, 3, 3))
+        bent = plane.bend(self._arm(reference), q)[0]
+        by_q[2, 2] = self._level(now) * float(bent @ np.asarray(self.force, dtype=float))
+        return by_q, by_v
 
 
 @dataclass(frozen=True)
-class Moment(_Controlled, Turning):
+class Moment(_Controlled, OwnForce):
     """A given moment about y.
 
     Parameters
@@ -123,14 +149,20 @@ class Moment(_Controlled, Turning):
         self._check_control()
 
     def generalised(
-        self, time: float, q: FloatArray, v: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the moment; it has no derivatives."""
-        return np.array([0, 0, self._level(time) * self.moment]), np.zeros((3, 3)), np.zeros((3, 3))
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> FloatArray:
+        """Return the moment."""
+        return np.array([0.0, 0.0, self._level(now) * self.moment])
+
+    def tangents(
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return zeros."""
+        return np.zeros((3, 3)), np.zeros((3, 3))
 
 
 @dataclass(frozen=True)
-class AngularSpring(Turning):
+class AngularSpring(OwnForce):
     """Torsion spring and damper about the reference point: -k (angle - rest) - c angle'.
 
     Parameters
@@ -149,18 +181,29 @@ class AngularSpring(Turning):
         require_not_negative(self, "N m s/rad", damping=self.damping)
         require_finite(self, rest=self.rest)
 
+    @property
+    def resists(self) -> BoolArray:
+        """A turn."""
+        return np.array([False, False, True])
+
     def generalised(
-        self, time: float, q: FloatArray, v: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Moment and its derivatives."""
-        by_q, by_v = np.zeros((3, 3)), np.zeros((3, 3))
-        by_q[2, 2], by_v[2, 2] = -self.stiffness, -self.damping
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> FloatArray:
+        """Return the moment."""
         moment = -self.stiffness * (q[2] - self.rest) - self.damping * v[2]
-        return np.array([0.0, 0.0, moment]), by_q, by_v
+        return np.array([0.0, 0.0, moment])
+
+    def tangents(
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return minus stiffness and damping."""
+        by_q, by_v = np.zeros((2, 3, 3))
+        by_q[2, 2], by_v[2, 2] = -self.stiffness, -self.damping
+        return by_q, by_v
 
 
 @dataclass(frozen=True)
-class StateForce(Turning):
+class StateForce(OwnForce):
     """Any force on (x, z, angle) as a function of time and state.
 
     Parameters
@@ -184,18 +227,29 @@ class StateForce(Turning):
         if value.shape != (3,) or not np.isfinite(value).all():
             raise BadScene("StateForce.function must give three finite numbers (N, N, N m)")
 
+    @property
+    def resists(self) -> BoolArray:
+        """All, for what is known of a function."""
+        return np.ones(3, dtype=bool)
+
     def generalised(
-        self, time: float, q: FloatArray, v: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Force and its derivatives."""
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> FloatArray:
+        """Return the values of the function."""
+        return np.asarray(self.function(now.time, q, v), dtype=float)
+
+    def tangents(
+        self, now: Instant, q: FloatArray, v: FloatArray, reference: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return central differences."""
 
         def force(q: FloatArray, v: FloatArray) -> FloatArray:
-            return np.asarray(self.function(time, q, v), dtype=float)
+            return np.asarray(self.function(now.time, q, v), dtype=float)
 
         step = 1e-6 * np.eye(3)
         by_q = np.array([force(q + s, v) - force(q - s, v) for s in step]).T / 2e-6
         by_v = np.array([force(q, v + s) - force(q, v - s) for s in step]).T / 2e-6
-        return force(q, v), by_q, by_v
+        return by_q, by_v
 
 
 @dataclass(frozen=True)
@@ -229,8 +283,13 @@ class Line(RigidForce, ABC):
         """Length in the reference configuration, m."""
         return float(np.linalg.norm(np.subtract(self.anchor, self.point)))
 
+    @property
+    def stiff(self) -> bool:
+        """Whether it may resist a change of its length."""
+        return True
+
     @abstractmethod
-    def tension(self, time: float, length: float, rate: float) -> tuple[float, float, float]:
+    def tension(self, now: Instant, length: float, rate: float) -> tuple[float, float, float]:
         """Tension, N, with its derivatives by length, N/m, and by its rate, N s/m."""
 
 
@@ -257,7 +316,12 @@ class Spring(Line):
         if self.rest is not None:
             require_not_negative(self, "m", rest=self.rest)
 
-    def tension(self, time: float, length: float, rate: float) -> tuple[float, float, float]:
+    @property
+    def stiff(self) -> bool:
+        """Whether it is more than a damper."""
+        return self.stiffness > 0
+
+    def tension(self, now: Instant, length: float, rate: float) -> tuple[float, float, float]:
         """Tension and its derivatives."""
         rest = self.length if self.rest is None else self.rest
         value = self.stiffness * (length - rest) + self.damping * rate
@@ -283,20 +347,27 @@ class LineMuscle(Line):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_positive(self, "N", max_force=self.max_force)
-        if isinstance(self.activation, type) or not isinstance(self.activation, Control):
+        if not isinstance(self.activation, Control):
             raise BadScene(
                 f"LineMuscle.activation must be a control, e.g. Ramp(0.5), not {self.activation!r}"
             )
-        for time in (0.0, *self.activation.breakpoints):
-            require_activation(self.activation(time), f"activation at t = {time:g} s")
-        if not isinstance(self.law, StressMobilisation):
-            raise BadScene(f"LineMuscle.law must be StressMobilisation(...), not {self.law!r}")
+        if not isinstance(self.activation, RememberingControl):
+            for time in (0.0, *self.activation.breakpoints):
+                require_activation(self.activation(time), f"activation at t = {time:g} s")
+        law = self.law
+        if not (isinstance(law, StressMobilisation) and all(map(is_number, law.numbers.values()))):
+            raise BadScene(f"LineMuscle.law must be StressMobilisation of numbers, not {law!r}")
 
-    def tension(self, time: float, length: float, rate: float) -> tuple[float, float, float]:
-        """Tension and its derivatives, by central differences of the two factors."""
+    def level(self, now: Instant) -> float:
+        """Activation at an instant, in [0, 1]."""
         assert self.activation is not None
-        level = self.activation(time)
-        require_activation(level, f"activation at t = {time:g} s")
+        level = self.activation.at(now.of("activation"))
+        require_activation(level, f"activation at t = {now.time:g} s")
+        return level
+
+    def tension(self, now: Instant, length: float, rate: float) -> tuple[float, float, float]:
+        """Tension and its derivatives, by central differences of the two factors."""
+        level = self.level(now)
         l0, law, step = self.length, self.law, 1e-6
 
         def slope(function: Callable[[float], float], x: float) -> float:
@@ -309,11 +380,6 @@ class LineMuscle(Line):
         return force * f * g, by_length, force * f * slope(law.rate_factor, speed) / l0
 
     @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Those of the activation, s."""
-        return self.activation.breakpoints if self.activation else ()
-
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Those of the activation, s."""
-        return self.activation.jumps if self.activation else ()
+    def parts(self) -> Mapping[str, Timed]:
+        """The activation."""
+        return {} if self.activation is None else {"activation": self.activation}

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.control import Instant
 from dolfin_tongue.rigid import plane
 from dolfin_tongue.rigid.body import RigidBody
-from dolfin_tongue.rigid.forces import SKULL, Line, PointForce, RigidForce, Turning
+from dolfin_tongue.rigid.forces import SKULL, Line, OwnForce, PointForce, RigidForce
 from dolfin_tongue.rigid.lines import Lines
 
 
@@ -43,13 +44,14 @@ class Loads:
         self._masses = np.array([body.mass for body in bodies])
         self._inertias = np.array([body.inertia for body in bodies])
         weights = [PointForce(body.centre, as_vector(body.mass * gravity)) for body in bodies]
-        self._forces: list[tuple[RigidBody, RigidForce]] = [
-            (body, force)
-            for body, weight in zip(bodies, weights, strict=True)
-            for force in (*body.forces, *([weight] if np.any(gravity) else []))
+        forces: list[tuple[RigidBody, str, RigidForce]] = [
+            (body, name, force) for body in bodies for name, force in body.named_forces
         ]
-        lines = [(body, force) for body, force in self._forces if isinstance(force, Line)]
-        self._lines = Lines(bodies, lines) if lines else None
+        if np.any(gravity):
+            forces += [(b, "weight", weight) for b, weight in zip(bodies, weights, strict=True)]
+        self._own = [(b, name, x) for b, name, x in forces if isinstance(x, OwnForce)]
+        self._line_parts = [(b, name, x) for b, name, x in forces if isinstance(x, Line)]
+        self._lines = Lines(bodies, self._line_parts) if self._line_parts else None
 
     # -- inertia -------------------------------------------------------------------------------
 
@@ -94,51 +96,41 @@ class Loads:
 
     # -- forces --------------------------------------------------------------------------------
 
-    def force(self, time: float, q: FloatArray, v: FloatArray) -> FloatArray:
+    def force(self, now: Instant, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the forces on the coordinates, shape (3b,), N and N m."""
-        out = self._lines.force(time, q, v) if self._lines else np.zeros(self.count)
-        for body, force in self._forces:
+        out = self._lines.force(now, q, v) if self._lines else np.zeros(self.count)
+        for body, name, force in self._own:
             at = self._places[body.name]
-            if isinstance(force, PointForce):
-                push, r = force.at(time), plane.turned(self._point(body, force), q[at][2])[0]
-                out[at] += (push[0], push[2], r[2] * push[0] - r[0] * push[2])
-            elif isinstance(force, Turning):
-                out[at] += force.generalised(time, q[at], v[at])[0]
+            own = now.of(body.label).of(name)
+            out[at] += force.generalised(own, q[at], v[at], body.reference)
         return out
 
-    def _point(self, body: RigidBody, force: PointForce) -> FloatArray:
-        """Arm of a force, shape (1, 3), m."""
-        return body.arms(np.asarray(force.point))
+    def muscles(
+        self, now: Instant, q: FloatArray, v: FloatArray
+    ) -> dict[tuple[str, str], tuple[float, float]]:
+        """Activation and force, N, of each muscle as a line, by the names of body and force."""
+        return self._lines.muscles(now, q, v) if self._lines else {}
 
     def force_tangents(
-        self, time: float, q: FloatArray, v: FloatArray
+        self, now: Instant, q: FloatArray, v: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of `force` by q and v, shape (3b, 3b) each."""
         by_q, by_v = np.zeros((2, self.count, self.count))
-        for body, force in self._forces:
-            at = self._places[body.name]
-            if isinstance(force, Turning):
-                _, own_q, own_v = force.generalised(time, q[at], v[at])
-                by_q[at, at] += own_q
-                by_v[at, at] += own_v
-            elif isinstance(force, PointForce):
-                bent = plane.bend(self._point(body, force), q[at])[0]
-                by_q[at.start + 2, at.start + 2] += bent @ force.at(time)
-            elif isinstance(force, Line):
-                self._add_line(body, force, time, q, v, by_q, by_v)
+        for body, name, force in self._own:
+            at, own = self._places[body.name], now.of(body.label).of(name)
+            own_q, own_v = force.tangents(own, q[at], v[at], body.reference)
+            by_q[at, at] += own_q
+            by_v[at, at] += own_v
+        for body, name, line in self._line_parts:
+            line_q, line_v = self._line_tangents(body, line, now.of(body.label).of(name), q, v)
+            by_q += line_q
+            by_v += line_v
         return by_q, by_v
 
-    def _add_line(
-        self,
-        body: RigidBody,
-        line: Line,
-        time: float,
-        q: FloatArray,
-        v: FloatArray,
-        by_q: FloatArray,
-        by_v: FloatArray,
-    ) -> None:
-        """Add the derivatives of -T d(length)/dq with the tension T (length, length rate)."""
+    def _line_tangents(
+        self, body: RigidBody, line: Line, now: Instant, q: FloatArray, v: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of -T d(length)/dq with the tension T (length, length rate)."""
         ends = [(body.name, line.point, -1.0), (line.to, line.anchor, 1.0)]
         apart, rate = np.subtract(line.anchor, line.point), np.zeros(3)
         apart_q = np.zeros((3, self.count))  # d(apart)/dq
@@ -154,15 +146,15 @@ class Loads:
             bends.append((at.start + 2, sign * plane.bend(arm, q[at])[0]))
         length = float(np.linalg.norm(apart))
         n = apart / length
-        tension, by_length, by_rate = line.tension(time, length, float(n @ rate))
+        tension, by_length, by_rate = line.tension(now, length, float(n @ rate))
         slope = n @ apart_q  # d(length)/dq, also d(length rate)/dv
         across = (apart_q - np.outer(n, slope)) / length  # dn/dq
         second, rate_slope = apart_q.T @ across, rate @ across
         for angle, bent in bends:
             second[angle, angle] += n @ bent
             rate_slope[angle] += n @ bent * v[angle]
-        by_q -= np.outer(slope, by_length * slope + by_rate * rate_slope) + tension * second
-        by_v -= by_rate * np.outer(slope, slope)
+        by_q = -np.outer(slope, by_length * slope + by_rate * rate_slope) - tension * second
+        return by_q, -by_rate * np.outer(slope, slope)
 
     def _body(self, name: str) -> RigidBody:
         return next(body for body in self.bodies if body.name == name)

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import BadScene, UnknownName, listing
+from dolfin_tongue.base.times import among, distinct
+from dolfin_tongue.base.values import Parameter, parameters_of, with_parameters
 from dolfin_tongue.body.body import Body
 from dolfin_tongue.boundary.gravity import Gravity
 from dolfin_tongue.boundary.sliding import Sliding
+from dolfin_tongue.control import Timed
 from dolfin_tongue.rigid.body import RigidBody
 from dolfin_tongue.rigid.forces import SKULL, Line
-from dolfin_tongue.scene.well_posed import loose_parts
-from dolfin_tongue.terms.term import EnergyTerm, Held, Support, Term
-
-#: Break points closer than this are one, s.
-SAME_TIME = 1e-9
+from dolfin_tongue.terms.labels import labels_of, numbered
+from dolfin_tongue.terms.support import Held, Support
+from dolfin_tongue.terms.term import Term
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Timed):
     """A body with its physics.
 
     Parameters
@@ -31,7 +31,7 @@ class Scene:
     body : mesh, regions, density, fibres.
     terms : the physics, each a frozen `Term`; only what is listed is computed.
     supports : kinematic conditions on nodes: `Attached("base")`, `Sliding(Plane(), "bottom")`, a
-        `RigidBody`.
+        `RigidBody`, or a class of your own that derives from `Held`.
 
     Raises
     ------
@@ -60,9 +60,15 @@ class Scene:
         for support in self.supports:
             if not isinstance(support, Support):
                 raise BadScene(f"{support!r} is not a support; terms go into `terms`")
+            if not isinstance(support, Held | Sliding | RigidBody):
+                raise BadScene(
+                    f"no solver knows what {type(support).__name__} does to its nodes; derive it "
+                    "from Held (which prescribes displacements), Sliding or RigidBody"
+                )
             support.check(self.body)
         self._check_shared()
         self._check_links()
+        self._check_parameters()
 
     def _check_shared(self) -> None:
         """Refuse nodes of two supports, by the names of both."""
@@ -90,6 +96,50 @@ class Scene:
                     raise UnknownName("rigid body", force.to, (*names, SKULL))
                 if isinstance(force, Line) and force.to == body.name:
                     raise BadScene(f"{body.name}: a {type(force).__name__} leads to itself")
+
+    def _check_parameters(self) -> None:
+        """Refuse parameters of one name and several values."""
+        known: dict[str, float] = {}
+        for parameter in self._all_parameters():
+            if known.setdefault(parameter.name, parameter.value) != parameter.value:
+                raise BadScene(
+                    f"the parameter {parameter.name!r} is {known[parameter.name]:g} in one place "
+                    f"and {parameter.value:g} in another; give two numbers two names"
+                )
+
+    # -- names -------------------------------------------------------------------------------------
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the terms, in tables and memories."""
+        return labels_of(self.terms)
+
+    @property
+    def parts(self) -> Mapping[str, Timed]:
+        """All terms and supports by name."""
+        supports = numbered([support.label for support in self.supports])
+        return dict(zip(self.labels + supports, (*self.terms, *self.supports), strict=True))
+
+    def _all_parameters(self) -> list[Parameter]:
+        parts = (self.body.density, *self.terms)
+        return [parameter for part in parts for parameter in parameters_of(part)]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Named parameters of all terms and of the density, with their values."""
+        return {parameter.name: parameter.value for parameter in self._all_parameters()}
+
+    def with_parameters(self, **numbers: float) -> Scene:
+        """Return the scene with other numbers for some named parameters; UnknownName lists them."""
+        for name in numbers:
+            if name not in self.parameters:
+                raise UnknownName("parameter", name, self.parameters)
+        density = with_parameters(self.body.density, numbers)
+        body = self.body if density is self.body.density else replace(self.body, density=density)
+        terms = tuple(with_parameters(term, numbers) for term in self.terms)
+        return Scene(body, terms, self.supports)
+
+    # -- supports ----------------------------------------------------------------------------------
 
     @property
     def rigid_bodies(self) -> tuple[RigidBody, ...]:
@@ -119,68 +169,20 @@ class Scene:
         return np.unique(np.concatenate([*held, []]).astype(np.int64))
 
     @property
+    def moves_supports(self) -> bool:
+        """Whether supports may do work: prescribed displacements or coordinates that change."""
+        given = any(body.given.any() for body in self.rigid_bodies)
+        return given or any(part.moves for part in self.held)
+
+    # -- time --------------------------------------------------------------------------------------
+
+    @property
     def breakpoints(self) -> tuple[float, ...]:
         """Times (s) at which some part is not smooth, increasing; round-off makes no two of one."""
-        every = [part.breakpoints for part in self.terms]
-        every += [part.breakpoints for part in self.supports]
-        times = sorted({t for part in every for t in part})
-        pairs = zip(times, [*times[1:], np.inf], strict=False)
-        return tuple(time for time, following in pairs if following - time > SAME_TIME)
+        return distinct(super().breakpoints)
 
     @property
     def jumps(self) -> tuple[float, ...]:
-        """Those of the break points at which some term jumps."""
-        every = [part.jumps for part in self.terms] + [part.jumps for part in self.supports]
-        jumps = [t for part in every for t in part]
-        return tuple(t for t in self.breakpoints if any(abs(t - j) <= SAME_TIME for j in jumps))
-
-    def check_volumes(self) -> None:
-        """Raise BadScene for cells without a free node: their pressure would be undetermined."""
-        free = ~np.isin(self.body.cells, self.held_nodes)
-        stuck = np.flatnonzero(~free.any(axis=1))
-        if stuck.size:
-            raise BadScene(
-                f"all nodes of cell(s) {listing(stuck)} are held, so that nothing "
-                "determines their pressure; hold fewer nodes or leave these cells out of the body"
-            )
-
-    def check_static(self) -> None:
-        """Raise BadScene if the supports leave rigid motions free (statics would be singular)."""
-        if not any(isinstance(term, EnergyTerm) and term.elastic for term in self.terms):
-            raise BadScene(
-                "a static problem needs tissue that resists: add a passive law, e.g. ReportTissue()"
-            )
-        pieces, number = self._pieces()
-        loose = [part.nodes(self.body) for part in (*self.sliding, *self._free_bodies)]
-        for piece in range(number):
-            if any((pieces[nodes] == piece).any() for nodes in loose):
-                continue  # see loose_parts
-            self._check_held(self.held_nodes[pieces[self.held_nodes] == piece], number)
-        if loose and (found := loose_parts(self, pieces)):
-            raise BadScene(
-                f"a static problem needs supports that hold everything: nothing resists a rigid "
-                f"motion of {' with '.join(found)}. Add Attached(region), a spring to the skull, "
-                "or Still() as the motion of a coordinate; or run the scene in time"
-            )
-
-    @property
-    def _free_bodies(self) -> tuple[RigidBody, ...]:
-        return tuple(body for body in self.rigid_bodies if not body.given.all())
-
-    def _pieces(self) -> tuple[IntArray, int]:
-        """Return the connected piece of each node, and how many pieces there are."""
-        first = np.repeat(self.body.cells[:, :1], 8, axis=1).ravel()
-        pairs = (np.ones(len(first)), (first, self.body.cells.ravel()))
-        size = len(self.body.points)
-        number, pieces = connected_components(coo_array(pairs, shape=(size, size)), directed=False)
-        return pieces, number
-
-    def _check_held(self, nodes: IntArray, pieces: int) -> None:
-        held = self.body.points[nodes]
-        if len(held) < 3 or np.linalg.matrix_rank(held - held.mean(axis=0), tol=1e-9) < 2:
-            raise BadScene(
-                f"a static problem needs attachments that hold "
-                f"{'the body' if pieces == 1 else 'each of its pieces'}: {len(held)} node(s) are "
-                "held, three that do not lie on one line are needed. Add Attached(region) to "
-                f"`supports`; regions: {', '.join(sorted(self.body.node_sets)) or '(none)'}"
-            )
+        """Those of the break points at which some part jumps."""
+        jumps = super().jumps
+        return tuple(time for time in self.breakpoints if among(time, jumps))

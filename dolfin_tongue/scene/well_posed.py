@@ -1,29 +1,89 @@
-"""Rigid motions that nothing in a static scene resists: its equations would be singular.
+"""What a solver must find in a scene: pressures that are determined, motions that are resisted.
 
-To first order, at rest: the unknowns are translation and rotation of every connected piece of the
-tissue and the coordinates of the rigid bodies. Supports give rows that are zero for a motion that
-they allow. What may resist by its stiffness (springs, muscles, contact, curved surfaces, weights
-that turn) gives rows too: whether it does, only the equations can tell. So what is found is loose
-for certain.
+Rigid motions that nothing in a static scene resists make its equations singular. To first order, at
+rest: the unknowns are translation and rotation of every connected piece of the tissue and the
+coordinates of the rigid bodies. Supports give rows that are zero for a motion that they allow. What
+may resist by its stiffness (springs, muscles, contact, curved surfaces, weights that turn) gives
+rows too: whether it does, only the equations can tell. So what is found is loose for certain.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.errors import BadScene, listing
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.faces import corners_of
 from dolfin_tongue.boundary.contact import Contact
-from dolfin_tongue.rigid import plane
-from dolfin_tongue.rigid.forces import AngularSpring, Line, PointForce, Spring, StateForce
-
-if TYPE_CHECKING:  # a scene asks this module
-    from dolfin_tongue.rigid.body import RigidBody
-    from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.rigid import RigidBody, plane
+from dolfin_tongue.rigid.forces import Line
+from dolfin_tongue.scene.scene import Scene
+from dolfin_tongue.terms.term import EnergyTerm
 
 #: Singular value below which a motion counts as not resisted; rows are of size 1.
 FREE = 1e-7
+
+
+def check_pressures(scene: Scene) -> None:
+    """Raise BadScene for cells without a free node: their pressure would be undetermined."""
+    held = scene.held_nodes
+    stuck = [
+        np.flatnonzero(np.isin(block.cells, held).all(axis=1)) + block.numbers.start
+        for block in scene.body.blocks
+    ]
+    found = np.concatenate(stuck)
+    if found.size:
+        raise BadScene(
+            f"all nodes of cell(s) {listing(found)} are held, so that nothing "
+            "determines their pressure; hold fewer nodes or leave these cells out of the body"
+        )
+
+
+def check_static(scene: Scene) -> None:
+    """Raise BadScene if the supports leave rigid motions free (statics would be singular)."""
+    if not any(isinstance(term, EnergyTerm) and term.elastic for term in scene.terms):
+        raise BadScene(
+            "a static problem needs tissue that resists: add a passive law, e.g. ReportTissue()"
+        )
+    pieces, number = pieces_of(scene.body)
+    free = [body for body in scene.rigid_bodies if not body.given.all()]
+    loose = [part.nodes(scene.body) for part in (*scene.sliding, *free)]
+    held = scene.held_nodes
+    for piece in range(number):
+        if any((pieces[nodes] == piece).any() for nodes in loose):
+            continue  # see loose_parts
+        _check_held(scene.body, held[pieces[held] == piece], number)
+    if loose and (found := loose_parts(scene, pieces)):
+        raise BadScene(
+            f"a static problem needs supports that hold everything: nothing resists a rigid "
+            f"motion of {' with '.join(found)}. Add Attached(region), a spring to the skull, "
+            "or Still() as the motion of a coordinate; or run the scene in time"
+        )
+
+
+def pieces_of(body: Body) -> tuple[IntArray, int]:
+    """Return the connected piece of each node, shape (n,), and how many pieces there are."""
+    first = [np.repeat(b.cells[:, 0], b.cells.shape[1]) for b in body.blocks]
+    rows = np.concatenate(first)
+    columns = np.concatenate([block.cells.ravel() for block in body.blocks])
+    size = len(body.points)
+    links = coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size))
+    number, pieces = connected_components(links, directed=False)
+    return pieces, number
+
+
+def _check_held(body: Body, nodes: IntArray, pieces: int) -> None:
+    held = body.points[nodes]
+    if len(held) < 3 or np.linalg.matrix_rank(held - held.mean(axis=0), tol=1e-9) < 2:
+        raise BadScene(
+            f"a static problem needs attachments that hold "
+            f"{'the body' if pieces == 1 else 'each of its pieces'}: {len(held)} node(s) are "
+            "held, three that do not lie on one line are needed. Add Attached(region) to "
+            f"`supports`; regions: {', '.join(sorted(body.node_sets)) or '(none)'}"
+        )
 
 
 def loose_parts(scene: Scene, pieces: IntArray) -> list[str]:
@@ -102,7 +162,7 @@ class _Rows:
             self._add(self.length * sliding.surface.gap(places).curvature @ moves)
         for term in scene.terms:
             if isinstance(term, Contact):
-                self._add(self.tissue(np.unique(body.surface(term.surface))))
+                self._add(self.tissue(np.unique(corners_of(body.surface(term.surface)))))
         if weighs:  # a rotation about the vertical lifts nothing
             up = scene.gravity / np.linalg.norm(scene.gravity)
             for piece in range(self.bodies // 6):
@@ -117,9 +177,8 @@ class _Rows:
         resisted = body.given.copy()
         resisted[2] |= bool(self.scene.gravity.any())
         for force in body.forces:
-            resisted[2] |= isinstance(force, AngularSpring | PointForce)
-            resisted |= isinstance(force, StateForce)
-            if isinstance(force, Line) and not (isinstance(force, Spring) and not force.stiffness):
+            resisted |= force.resists
+            if isinstance(force, Line) and force.stiff:
                 far = self.bone(force.to, np.asarray(force.anchor, dtype=float))
                 self._add(self.bone(body.name, np.asarray(force.point, dtype=float)) - far)
         self._add(np.eye(self.size)[at : at + 3][resisted])

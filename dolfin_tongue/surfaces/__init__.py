@@ -1,7 +1,7 @@
 """Rigid surfaces to slide on or to touch."""
 
 from dolfin_tongue.surfaces.base import Gap, Surface
-from dolfin_tongue.surfaces.facing import facing
+from dolfin_tongue.surfaces.faces_towards import faces_towards
 from dolfin_tongue.surfaces.files import read_surface
 from dolfin_tongue.surfaces.implicit import Ellipsoid, Implicit
 from dolfin_tongue.surfaces.overlap import overlap
@@ -17,7 +17,7 @@ __all__ = [
     "Sphere",
     "Surface",
     "Triangulated",
-    "facing",
+    "faces_towards",
     "overlap",
     "read_surface",
 ]

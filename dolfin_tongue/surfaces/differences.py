@@ -53,7 +53,7 @@ def second_derivatives(function: Function, points: FloatArray, step: float) -> F
             weight * (function(points + i * move) + function(points - i * move) - 2 * middle)
             for i, weight in enumerate(SECOND, 1)
         ]
-        return sum(parts) / step**2
+        return np.sum(parts, axis=0) / step**2
 
     hessian = np.empty((len(points), 3, 3))
     for i in range(3):

@@ -16,12 +16,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dolfin_tongue.base.arrays import FloatArray
-from dolfin_tongue.base.errors import OutOfRange, TongueError, require_flags, require_positive
+from dolfin_tongue.base.arrays import BoolArray, FloatArray
+from dolfin_tongue.base.errors import (
+    OutOfRange,
+    TongueError,
+    require_flags,
+    require_positive,
+    require_vector,
+)
 from dolfin_tongue.surfaces.base import Gap, Surface
 from dolfin_tongue.surfaces.differences import Function, first_derivatives, second_derivatives
 from dolfin_tongue.surfaces.simple import Vector
-from dolfin_tongue.terms.term import require_vector
 
 if TYPE_CHECKING:  # UFL's algorithms are loaded when they are needed
     from dolfin_tongue.surfaces.formula import Formula
@@ -204,10 +209,12 @@ class Implicit(Surface):
     @cached_property
     def _formulas(self) -> tuple[Formula, list[Formula], list[list[Formula]]] | None:
         """g, its first and second derivatives, if g is a UFL expression."""
-        import ufl
+        try:
+            import ufl
 
-        from dolfin_tongue.surfaces.formula import formula, place
-
+            from dolfin_tongue.surfaces.formula import formula, place
+        except ModuleNotFoundError:  # without UFL the function must be one of NumPy
+            return None
         x = place()
         try:
             expression = self.function(x)
@@ -247,7 +254,7 @@ class Implicit(Surface):
         if self.own_hessian is not None:
             return np.asarray(self.own_hessian(points), dtype=float)
         if self._formulas is not None:
-            hessian = np.empty((len(points), 3, 3))
+            hessian: FloatArray = np.empty((len(points), 3, 3))
             for i, row in enumerate(self._formulas[2]):
                 for j, part in enumerate(row):
                     hessian[:, i, j] = hessian[:, j, i] = part(points)
@@ -272,7 +279,7 @@ class Implicit(Surface):
     def _slopes(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         return self.gradient(points), self.hessian(points)
 
-    def _nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _nearest(self, points: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Nearest points of the surface, and whether they were found.
 
         Newton's steps for p + l dg(p) = y, g(p) = 0, from the point along the gradient. Where y
@@ -294,7 +301,7 @@ class Implicit(Surface):
 
     def _step_to_nearest(
         self, points: FloatArray, near: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[FloatArray, BoolArray]:
         """One of Newton's steps, shape (k, 3), m, and whether it leads to a nearest point."""
         gradient, hessian = self._slopes(near)
         normal, shape = shape_operator(gradient, hessian)

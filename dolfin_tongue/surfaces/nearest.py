@@ -96,8 +96,11 @@ def _boxes(corners: FloatArray, first: IntArray, levels: int) -> FloatArray:
     return boxes
 
 
+Triple = tuple[float, float, float]
+
+
 @compiled
-def _box_distance(point, box):
+def _box_distance(point: FloatArray, box: FloatArray) -> float:
     """Squared distance of a point from a box, m2."""
     total = 0.0
     for i in range(3):
@@ -107,17 +110,17 @@ def _box_distance(point, box):
 
 
 @compiled
-def _minus(a, b):
+def _minus(a: FloatArray, b: FloatArray) -> Triple:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @compiled
-def _dot(a, b):
+def _dot(a: Triple, b: Triple) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
-def _weights(point, corners):
+def _weights(point: FloatArray, corners: FloatArray) -> tuple[float, float, int]:
     """Weights of corners 1 and 2 at a triangle's nearest point, and the feature it lies on.
 
     By Voronoi regions: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
@@ -146,7 +149,7 @@ def _weights(point, corners):
 
 
 @compiled
-def _measure(point, corners, out):
+def _measure(point: FloatArray, corners: FloatArray, out: FloatArray) -> tuple[float, int]:
     """Write a triangle's nearest point; its squared distance, m2, and feature."""
     second, third, feature = _weights(point, corners)
     distance = 0.0
@@ -158,7 +161,15 @@ def _measure(point, corners, out):
 
 
 @compiled
-def _search(points, corners, first, boxes, row, feature, place):
+def _search(
+    points: FloatArray,
+    corners: FloatArray,
+    first: IntArray,
+    boxes: FloatArray,
+    row: IntArray,
+    feature: IntArray,
+    place: FloatArray,
+) -> None:
     """Depth first, the nearer child first; the triangle of the point before gives a first bound."""
     leaves = len(first) - 1
     stack, depth = np.empty(64, dtype=np.int64), 0

@@ -39,8 +39,9 @@ class Retraction:
         reach = float(self.radii.max())
         nearest, _ = cKDTree(self.centres).query(points, distance_upper_bound=reach)
         near = np.flatnonzero(np.isfinite(nearest))
-        for centre, depth, radius in zip(self.centres, self.depths, self.radii, strict=True):
-            total[near] += depth * _dent(points[near], centre, radius)
+        for number, centre in enumerate(self.centres):
+            dent = _dent(points[near], np.asarray(centre), float(self.radii[number]))
+            total[near] += self.depths[number] * dent
         return total
 
     def joined(self, other: Retraction | None) -> Retraction:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray, IntArray
 from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.surfaces.nearest import Tree
 from dolfin_tongue.surfaces.triangles import feature_normals
@@ -38,7 +38,7 @@ class Samples:
     origin: FloatArray
     spacing: float
     distance: FloatArray
-    known: IntArray
+    known: BoolArray
 
     @property
     def places(self) -> FloatArray:
@@ -49,7 +49,7 @@ class Samples:
 
 def signed_distance(
     points: FloatArray, triangles: IntArray, tree: Tree, places: FloatArray
-) -> tuple[FloatArray, IntArray]:
+) -> tuple[FloatArray, BoolArray]:
     """Exact signed distance of a triangulated surface.
 
     Where the nearest point lies on the rim of a sheet there is no side; there the sheet is
@@ -124,7 +124,7 @@ def _smooth(distance: FloatArray, width: float) -> FloatArray:
 
 def _needed(
     tree: Tree, origin: FloatArray, blocks: IntArray, spacing: float, reach: float
-) -> IntArray:
+) -> BoolArray:
     """Mark the samples of all blocks whose centres are near enough to hold some of the band."""
     index = np.moveaxis(np.indices(tuple(blocks)), 0, -1).reshape(-1, 3)
     centres = origin + spacing * (BLOCK * index + (BLOCK - 1) / 2)

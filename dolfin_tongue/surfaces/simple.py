@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
-from dolfin_tongue.base.errors import OutOfRange, require_flags, require_positive
+from dolfin_tongue.base.errors import OutOfRange, require_flags, require_positive, require_vector
 from dolfin_tongue.surfaces.base import Surface
-from dolfin_tongue.terms.term import require_vector
 
 Vector = tuple[float, float, float]
 

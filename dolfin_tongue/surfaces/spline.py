@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray
 from dolfin_tongue.base.compiled import compiled
 
 
@@ -26,7 +26,7 @@ class Spline:
     origin: FloatArray
     spacing: float
     coefficients: FloatArray
-    known: IntArray
+    known: BoolArray
 
     def evaluate(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Value (k,), gradient (k, 3) and Hessian (k, 3, 3); inf, 0, 0 where it is not known."""
@@ -39,7 +39,7 @@ class Spline:
 
 
 def spline_through(
-    origin: FloatArray, spacing: float, samples: FloatArray, known: IntArray
+    origin: FloatArray, spacing: float, samples: FloatArray, known: BoolArray
 ) -> Spline:
     """Interpolate samples.
 
@@ -62,7 +62,7 @@ def spline_through(
 
 
 @compiled
-def _fill(share, weights):
+def _fill(share: float, weights: FloatArray) -> None:
     """Write the four cubic B-splines that are not zero at a place in a cell; two derivatives."""
     t, s = share, 1.0 - share
     weights[0, 0], weights[0, 3] = s * s * s / 6.0, t * t * t / 6.0
@@ -74,9 +74,55 @@ def _fill(share, weights):
 
 
 @compiled
-def _evaluate(place, spacing, coefficients, known, value, gradient, hessian):
-    """Sum the 64 B-splines around each place, which is in units of the spacing."""
-    shape = known.shape
+def _sum(
+    x: FloatArray, y: FloatArray, z: FloatArray, coefficients: FloatArray, out: FloatArray
+) -> None:
+    """Sum 64 B-splines: write f, f_x, f_y, f_z, f_xx, f_yy, f_zz, f_xy, f_xz, f_yz.
+
+    Parameters
+    ----------
+    x, y, z : ndarray, shape (3, 4) -- the splines along each axis with two derivatives.
+    coefficients : ndarray, shape (4, 4, 4).
+    """
+    out[:] = 0.0
+    for a in range(4):
+        g, gy, gz, gyy, gzz, gyz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for b in range(4):
+            h, hz, hzz = 0.0, 0.0, 0.0
+            for c in range(4):
+                h += z[0, c] * coefficients[a, b, c]
+                hz += z[1, c] * coefficients[a, b, c]
+                hzz += z[2, c] * coefficients[a, b, c]
+            g += y[0, b] * h
+            gy += y[1, b] * h
+            gyy += y[2, b] * h
+            gz += y[0, b] * hz
+            gyz += y[1, b] * hz
+            gzz += y[0, b] * hzz
+        out[0] += x[0, a] * g
+        out[1] += x[1, a] * g
+        out[2] += x[0, a] * gy
+        out[3] += x[0, a] * gz
+        out[4] += x[2, a] * g
+        out[5] += x[0, a] * gyy
+        out[6] += x[0, a] * gzz
+        out[7] += x[1, a] * gy
+        out[8] += x[1, a] * gz
+        out[9] += x[0, a] * gyz
+
+
+@compiled
+def _evaluate(
+    place: FloatArray,
+    spacing: float,
+    coefficients: FloatArray,
+    known: BoolArray,
+    value: FloatArray,
+    gradient: FloatArray,
+    hessian: FloatArray,
+) -> None:
+    """Evaluate the spline at each place, which is in units of the spacing."""
+    shape, f = known.shape, np.empty(10)
     x, y, z = np.empty((3, 4)), np.empty((3, 4)), np.empty((3, 4))
     for p in range(len(place)):
         u, v, w = place[p, 0], place[p, 1], place[p, 2]
@@ -88,40 +134,13 @@ def _evaluate(place, spacing, coefficients, known, value, gradient, hessian):
         _fill(u - i, x)
         _fill(v - j, y)
         _fill(w - k, z)
-        f, fx, fy, fz = 0.0, 0.0, 0.0, 0.0
-        fxx, fyy, fzz, fxy, fxz, fyz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for a in range(4):
-            g, gy, gz, gyy, gzz, gyz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for b in range(4):
-                h, hz, hzz = 0.0, 0.0, 0.0
-                for c in range(4):
-                    coefficient = coefficients[i + a - 1, j + b - 1, k + c - 1]
-                    h += z[0, c] * coefficient
-                    hz += z[1, c] * coefficient
-                    hzz += z[2, c] * coefficient
-                g += y[0, b] * h
-                gy += y[1, b] * h
-                gyy += y[2, b] * h
-                gz += y[0, b] * hz
-                gyz += y[1, b] * hz
-                gzz += y[0, b] * hzz
-            f += x[0, a] * g
-            fx += x[1, a] * g
-            fxx += x[2, a] * g
-            fy += x[0, a] * gy
-            fxy += x[1, a] * gy
-            fz += x[0, a] * gz
-            fxz += x[1, a] * gz
-            fyy += x[0, a] * gyy
-            fyz += x[0, a] * gyz
-            fzz += x[0, a] * gzz
-        value[p] = f
-        gradient[p, 0], gradient[p, 1], gradient[p, 2] = fx, fy, fz
+        _sum(x, y, z, coefficients[i - 1 : i + 3, j - 1 : j + 3, k - 1 : k + 3], f)
+        value[p] = f[0]
         own = hessian[p]
-        own[0, 0], own[1, 1], own[2, 2] = fxx, fyy, fzz
-        own[0, 1], own[1, 0], own[0, 2], own[2, 0] = fxy, fxy, fxz, fxz
-        own[1, 2], own[2, 1] = fyz, fyz
+        own[0, 1], own[1, 0], own[0, 2], own[2, 0] = f[7], f[7], f[8], f[8]
+        own[1, 2], own[2, 1] = f[9], f[9]
         for q in range(3):
-            gradient[p, q] /= spacing
+            gradient[p, q] = f[1 + q] / spacing
+            own[q, q] = f[4 + q]
             for r in range(3):
                 own[q, r] /= spacing * spacing

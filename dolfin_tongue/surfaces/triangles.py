@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
+from dolfin_tongue.base.arrays import BoolArray, FloatArray, IntArray
 from dolfin_tongue.base.errors import BadMesh, listing
-from dolfin_tongue.body.body import LARGEST_SIZE
+from dolfin_tongue.base.units import LARGEST_SIZE
 
 #: Twice the area of a triangle over the square of its longest edge, below which it has no normal.
 SLIVER = 1e-10
@@ -103,7 +103,7 @@ def _check_edges(name: str, triangles: IntArray, sheet: bool) -> None:
         )
 
 
-def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
     """Edges of triangles.
 
     Parameters
@@ -134,7 +134,7 @@ def volume(points: FloatArray, triangles: IntArray) -> float:
     return float((middle * area_vectors(points, triangles)).sum() / 3)
 
 
-def feature_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
+def feature_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, BoolArray]:
     """Return unit normals that tell the side of a point from its nearest point of the surface.
 
     The normal at a corner is the mean of its triangles', weighted by their angles; the difference

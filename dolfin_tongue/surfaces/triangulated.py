@@ -89,7 +89,7 @@ class Triangulated(Surface):
         rounded by as much; 0 keeps them, and the kinks.
     offset : thickness laid on the surface, m: the gap is the distance less this. A negative one
         moves the whole wall back.
-    retraction : local dents of the wall; see `yielding`.
+    retraction : local dents of the wall; see `with_clearance`.
 
     Raises
     ------
@@ -117,7 +117,9 @@ class Triangulated(Surface):
         name = type(self).__name__
         require_flags(self, sheet=self.sheet, inside=self.inside)
         if not (self.retraction is None or isinstance(self.retraction, Retraction)):
-            raise OutOfRange(f"{name}.retraction", self.retraction, "None, or made by yielding()")
+            raise OutOfRange(
+                f"{name}.retraction", self.retraction, "None, or made by with_clearance()"
+            )
         object.__setattr__(self, "points", real_numbers(f"{name}: points", self.points))
         triangles = whole_numbers(f"{name}: triangles", self.triangles)
         object.__setattr__(self, "triangles", triangles)
@@ -235,7 +237,7 @@ class Triangulated(Surface):
         """Return the same surface with the other side free."""
         return self._like(inside=not self.inside)
 
-    def yielding(
+    def with_clearance(
         self, points: FloatArray, clearance: float = 0.0, radius: float | None = None
     ) -> Triangulated:
         """Return a surface that yields where points, e.g. of a body at rest, are too near.

@@ -1,96 +1,156 @@
 """What a term is: a frozen piece of physics that a scene lists.
 
-A term holds numbers and names. It states its virtual power once, in UFL; the direct solver has one
-nodal force for the same class. What a scene does not list is not compiled, stored or evaluated.
+A term holds numbers and names. It states its physics once, in UFL (loaded when a form is made, so
+that a scene can be written and solved by the direct solver without it); the direct solver has a
+part of its own for the same class. What a scene does not list is not compiled, stored or evaluated.
+
+Which base to take for a law of your own: a stress, `StressTerm`; an energy per volume,
+`EnergyTerm`, or per area of a surface, `SurfaceTerm`; anything else, `FormTerm`.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
-import ufl
 
-from dolfin_tongue.base.arrays import FloatArray, IntArray
-from dolfin_tongue.base.errors import OutOfRange, is_number
+from dolfin_tongue.base.arrays import FloatArray
+from dolfin_tongue.base.errors import BadScene
+from dolfin_tongue.base.values import Value
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.terms.kinematics import Expr, Kinematics
+from dolfin_tongue.body.regions import CellValues, on_cells
+from dolfin_tongue.control.timed import Instant, Timed
+
+if TYPE_CHECKING:  # UFL
+    from dolfin_tongue.terms.kinematics import Deformation, Kinematics
+
+#: Any UFL expression or form (UFL ships no usable types).
+Expr = Any
+Form = Any
 
 
 class Fields(Protocol):
-    """What the FEniCSx side lends to a term: values on cells, constant or varying in time."""
+    """What the FEniCSx solver lends to a term: numbers and values on cells as UFL expressions."""
 
     body: Body
 
+    def value(self, value: Value, what: str = "a value") -> Expr:
+        """Value of a law: a constant, or a coefficient; see `base.values`."""
+
+    def resolved(self, values: CellValues) -> Expr:
+        """Values that have been spread over cells, or over cells and fibre slots."""
+
     def on_cells(self, values: FloatArray) -> Expr:
-        """UFL coefficient that is constant in each cell; `values` of shape (m,) or (m, k)."""
+        """UFL coefficient of values on cells.
 
-    def varying_on_cells(self, values: Callable[[float], FloatArray]) -> Expr:
-        """Like `on_cells`, with values that are evaluated anew at each time t, s."""
+        Parameters
+        ----------
+        values : ndarray of shape (m,), (m, k) for a vector of k components, or (m, q, k) with
+            values at the quadrature points.
+        """
 
-    def surface(self, name: str) -> ufl.Measure:
-        """Measure dS of a named surface of the reference body, m2; UnknownName lists them."""
+    def varying(self, values: Callable[[Instant], FloatArray], components: int = 0) -> Expr:
+        """UFL coefficient of values on cells that are evaluated anew at each new instant.
+
+        Parameters
+        ----------
+        values : of an instant, with the term's own memory: ndarray of shape (m,) or (m, k).
+        components : k, or 0 for scalars.
+        """
 
 
-class Term(ABC):
-    """Base of the terms that do (virtual) power."""
+class Term(Timed, ABC):
+    """Base of all terms.
+
+    Attributes
+    ----------
+    numbers : names of the fields that are a `Value` on cells.
+    """
+
+    numbers: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def domain(self) -> str | None:
+        """Name of the surface on which it acts, its field `surface`; None for the volume."""
+        return getattr(self, "surface", None)
 
     def check(self, body: Body) -> None:
         """Refuse names and numbers that do not fit the body, before any solve."""
+        for name in self.numbers:
+            on_cells(f"{type(self).__name__}.{name}", getattr(self, name), body)
+
+
+class FormTerm(Term):
+    """A term that does (virtual) power, stated as a UFL form."""
 
     @abstractmethod
-    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form | None:
+    def virtual_power(self, kin: Any, fields: Fields, test: Expr) -> Form | None:
         """State internal minus external virtual power of the test velocity, W.
 
         Returns None where the term has no part (a rate term in a static scene).
+
+        Parameters
+        ----------
+        kin : `Kinematics` of the volume, or `SurfaceKinematics` of the term's surface.
+        fields : coefficients.
+        test : the test velocity w, or a velocity.
         """
 
-    def energy(self, kin: Kinematics, fields: Fields) -> ufl.Form | None:
+    def energy(self, kin: Any, fields: Fields) -> Form | None:
         """Potential energy of the whole body, J; None for a term without one."""
         return None
 
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Times (s) at which the term is not smooth; steps end there."""
-        return ()
 
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Those of the break points at which the term itself jumps."""
-        return ()
+class StressTerm(FormTerm):
+    """A term that is a stress in the tissue."""
+
+    @abstractmethod
+    def first_piola(self, kin: Kinematics, fields: Fields) -> Expr | None:
+        """First Piola-Kirchhoff stress P, shape (3, 3), Pa; None where the term has no part."""
+
+    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> Form | None:
+        """Integral of P : grad w (26)."""
+        stress = self.first_piola(kin, fields)
+        return None if stress is None else kin.power(stress, test)
 
 
-class EnergyTerm(Term):
-    """A term that derives from an energy density W; its first Piola-Kirchhoff stress is dW/dF."""
+class EnergyTerm(FormTerm):
+    """A term that derives from an energy density W of the deformation or of the displacement."""
 
     #: Whether it resists deformation, so that a static body has an equilibrium.
     elastic: ClassVar[bool] = True
 
     @abstractmethod
-    def energy_density(self, kin: Kinematics, fields: Fields) -> Expr:
+    def energy_density(self, kin: Any, fields: Fields) -> Expr:
         """Energy per reference volume, J/m3 (of a `SurfaceTerm`: per reference area, J/m2)."""
 
-    def measure(self, kin: Kinematics, fields: Fields) -> ufl.Measure:
-        """Where the energy sits: the volume of the body."""
-        return kin.dx
-
-    def energy(self, kin: Kinematics, fields: Fields) -> ufl.Form:
+    def energy(self, kin: Deformation, fields: Fields) -> Form:
         """Integral of W, J."""
-        return self.energy_density(kin, fields) * self.measure(kin, fields)
+        return self.energy_density(kin, fields) * kin.dx
 
-    def virtual_power(self, kin: Kinematics, fields: Fields, test: Expr) -> ufl.Form:
-        """Integral of dW/dF : grad w (29), (39): the derivative of the energy along w."""
-        stress = ufl.diff(self.energy_density(kin, fields), kin.F)
-        return ufl.inner(stress, ufl.grad(test)) * self.measure(kin, fields)
+    def first_piola(self, kin: Kinematics, fields: Fields) -> Expr | None:
+        """Stress dW/dF (29), (39), Pa; None for an energy that does not depend on `kin.F`."""
+        return kin.by_F(self.energy_density(kin, fields))
+
+    def virtual_power(self, kin: Deformation, fields: Fields, test: Expr) -> Form:
+        """Take the derivative of the energy along w, the integral of dW/dF : grad w (29), (39).
+
+        An energy may depend on the displacement itself, not on F alone; then its derivative by the
+        whole state is taken.
+        """
+        density = self.energy_density(kin, fields)
+        if kin.through_F(density):
+            return kin.power(kin.by_F(density), test)
+        return kin.derivative(density * kin.dx, test)
 
 
 class SurfaceTerm(EnergyTerm):
     """An energy per reference area of a named surface of the body, W in J/m2.
 
-    W depends on the tangential part of F only, `kin.area_ratio` and `kin.surface_C_trace`, so that
-    dW/dF : grad w is the power of the membrane forces, S^ab dE_ab (14).
+    `kin` is a `SurfaceKinematics`, which knows the tangential part of F only: take
+    `kin.area_ratio` and `kin.surface_C_trace`, `kin.normal` and `kin.displacement`.
     """
 
     #: Name of the surface; a field of the dataclass.
@@ -98,70 +158,11 @@ class SurfaceTerm(EnergyTerm):
 
     def check(self, body: Body) -> None:
         """Refuse a surface that the body does not have."""
+        super().check(body)
         body.surface(self.surface)
-
-    def measure(self, kin: Kinematics, fields: Fields) -> ufl.Measure:
-        """Where the energy sits: the surface."""
-        return fields.surface(self.surface)
-
-
-class Support(ABC):
-    """A kinematic condition on nodes; no node may belong to two of them."""
-
-    @property
-    def label(self) -> str:
-        """What messages call it."""
-        return type(self).__name__
-
-    def check(self, body: Body) -> None:
-        """Refuse names and numbers that do not fit the body, before any solve."""
-
-    @abstractmethod
-    def nodes(self, body: Body) -> IntArray:
-        """Node numbers that it acts on."""
-
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Times (s) at which it is not smooth; steps end there."""
-        return ()
-
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Those of the break points at which forces of it jump."""
-        return ()
-
-
-class Held(Support):
-    """Nodes whose displacement is prescribed."""
-
-    @abstractmethod
-    def displacement(self, points: FloatArray, time: float) -> FloatArray:
-        """Prescribed displacement of the nodes at a time.
-
-        Parameters
-        ----------
-        points : ndarray, shape (k, 3), m -- reference positions of the nodes, in order of `nodes`.
-        time : s.
-
-        Returns
-        -------
-        ndarray, shape (k, 3), m.
-        """
-
-
-def require_vector(owner: object, name: str, value: Any) -> None:
-    """Raise OutOfRange unless the value has three finite components."""
-    parts = value.tolist() if isinstance(value, np.ndarray) else value
-    if not (isinstance(parts, tuple | list) and len(parts) == 3 and all(map(is_number, parts))):
-        raise OutOfRange(f"{type(owner).__name__}.{name}", value, "three finite numbers")
-
-
-def labels_of(terms: Sequence[Term]) -> list[str]:
-    """Class names of the terms in small letters, numbered where one occurs twice."""
-    names = [type(term).__name__ for term in terms]
-    labels = []
-    for i, name in enumerate(names):
-        suffix = f"_{names[: i + 1].count(name)}" if names.count(name) > 1 else ""
-        words = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
-        labels.append(words + suffix)
-    return labels
+        for name in self.numbers:
+            if np.ndim(getattr(self, name)) == 2:
+                raise BadScene(
+                    f"{type(self).__name__}.{name} has values at the quadrature points of cells, "
+                    "which a surface does not have; give one value for each cell"
+                )

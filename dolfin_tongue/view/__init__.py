@@ -10,7 +10,7 @@ from dolfin_tongue.view.contact import contact_picture
 from dolfin_tongue.view.fibres import fibre_pictures
 from dolfin_tongue.view.picture import shape_picture
 from dolfin_tongue.view.plots import contact_plot, energy_plot, rigid_plot, trajectories
-from dolfin_tongue.view.sheet import contact_sheet, final_shapes, telling_frames
+from dolfin_tongue.view.sheet import contact_sheet, final_shapes, key_frames
 from dolfin_tongue.view.surroundings import Surroundings
 
 __all__ = [
@@ -26,8 +26,8 @@ __all__ = [
     "energy_plot",
     "fibre_pictures",
     "final_shapes",
+    "key_frames",
     "rigid_plot",
     "shape_picture",
-    "telling_frames",
     "trajectories",
 ]

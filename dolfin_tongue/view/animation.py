@@ -11,18 +11,10 @@ from PIL import Image, ImageDraw
 from dolfin_tongue.base.errors import OutOfRange
 from dolfin_tongue.base.files import replacing
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.march.state import State
-from dolfin_tongue.view.canvas import (
-    FAINT,
-    INK,
-    WHISKER,
-    WHITE,
-    draw_bars,
-    font,
-    milliseconds,
-)
+from dolfin_tongue.body.state import State
+from dolfin_tongue.view.canvas import draw_bars, font, milliseconds
 from dolfin_tongue.view.film import Film
-from dolfin_tongue.view.scene3d import Colour
+from dolfin_tongue.view.palette import FAINT, INK, WHISKER, WHITE, Colour
 from dolfin_tongue.view.surroundings import Surroundings
 
 #: Width of the animation, pixels.

@@ -15,17 +15,12 @@ from scipy.spatial import ConvexHull, QhullError
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.march.state import State
+from dolfin_tongue.body.state import State
+from dolfin_tongue.control import Instant
 from dolfin_tongue.rigid import SKULL, LineMuscle, RigidBody, plane
 from dolfin_tongue.rigid.forces import Line
 from dolfin_tongue.view.camera import Camera
-from dolfin_tongue.view.canvas import WHITE
-
-BONE, BONE_EDGE = (244, 232, 200), (110, 90, 48)
-SPRING, MUSCLE, IDLE = (84, 90, 100), (176, 16, 28), (222, 150, 146)
-
-#: Colours that a palette has to have.
-INKS = [BONE, BONE_EDGE, SPRING, MUSCLE, IDLE]
+from dolfin_tongue.view.palette import BONE, BONE_EDGE, IDLE, MUSCLE, SPRING, WHITE, Colour
 
 #: Opacity of a bone, 0-255.
 OPACITY = 150
@@ -76,28 +71,24 @@ class Skeleton:
     def moved(self, name: str, points: FloatArray, q: FloatArray) -> FloatArray:
         """Places of points (k, 3), m, of a bone, or of the skull, which stays."""
         points = np.atleast_2d(points)
-        for bone, coordinates in zip(self.bones, q, strict=True):
+        for number, bone in enumerate(self.bones):
             if bone.name == name:
-                return points + plane.displacement(bone.arms(points), coordinates)
+                return points + plane.displacement(bone.arms(points), q[number])
         return points
 
-    def lines(self, state: State) -> list[tuple[Line, FloatArray]]:
-        """Springs and muscles with their ends, shape (2, 3), m."""
-        q = self.coordinates(state)
-        return [
-            (
-                force,
-                np.vstack(
-                    [
+    def lines(self, state: State) -> list[tuple[Line, Instant, FloatArray]]:
+        """Springs and muscles, each at its own instant and with its ends, shape (2, 3), m."""
+        q, now = self.coordinates(state), Instant(state.time, state.memory)
+        found = []
+        for bone in self.bones:
+            for name, force in bone.named_forces:
+                if isinstance(force, Line):
+                    ends = [
                         self.moved(bone.name, np.asarray(force.point), q),
                         self.moved(force.to, np.asarray(force.anchor), q),
                     ]
-                ),
-            )
-            for bone in self.bones
-            for force in bone.forces
-            if isinstance(force, Line)
-        ]
+                    found.append((force, now.of(bone.label).of(name), np.vstack(ends)))
+        return found
 
     def outlines(self, state: State) -> list[tuple[RigidBody, FloatArray, FloatArray, FloatArray]]:
         """Bones with their hull (k, 3), centre of mass (3,) and reference point (3,), m."""
@@ -111,7 +102,7 @@ class Skeleton:
 
     def cloud(self, state: State) -> FloatArray:
         """Return all points that are drawn, shape (k, 3), m."""
-        parts = [ends for _, ends in self.lines(state)]
+        parts = [ends for _, _, ends in self.lines(state)]
         for _, outline, centre, pivot in self.outlines(state):
             parts += [outline, centre[None], pivot[None]]
         return np.concatenate(parts)
@@ -124,8 +115,8 @@ class Skeleton:
             arm = camera.project(np.stack([centre, pivot]))
             image = _bone(image, path, arm, pen)
         draw = ImageDraw.Draw(image)
-        for force, ends in self.lines(state):
-            _line(draw, force, camera.project(ends), state.time, pen)
+        for force, now, ends in self.lines(state):
+            _line(draw, force, camera.project(ends), _colour_of(force, now), pen)
         for bone, _, centre, pivot in self.outlines(state):
             places = camera.project(np.stack([centre, pivot]))
             if bone.pivot is not None:
@@ -183,22 +174,31 @@ def _stroke(
             draw.ellipse((x - half, y - half, x + half, y + half), fill)
 
 
+def _colour_of(force: Line, now: Instant) -> tuple[Colour, float]:
+    """Colour of a spring or muscle, and its width over that of a pen."""
+    if not isinstance(force, LineMuscle):
+        return SPRING, 2.0
+    share = force.level(now) ** 0.5
+    red, green, blue = (round(a + share * (b - a)) for a, b in zip(IDLE, MUSCLE, strict=True))
+    return (red, green, blue), 3.0 + 2.0 * share
+
+
 def _line(
-    draw: ImageDraw.ImageDraw, force: Line, ends: FloatArray, time: float, pen: float
+    draw: ImageDraw.ImageDraw,
+    force: Line,
+    ends: FloatArray,
+    look: tuple[Colour, float],
+    pen: float,
 ) -> None:
     """Draw a spring or muscle with its ends (2, 2), pixels; the far end on the skull is square."""
-    path, colour, width = ends, SPRING, 2.0 * pen
-    if isinstance(force, LineMuscle):
-        assert force.activation is not None
-        share = float(np.clip(force.activation(time), 0.0, 1.0)) ** 0.5
-        red, green, blue = (round(a + share * (b - a)) for a, b in zip(IDLE, MUSCLE, strict=True))
-        colour, width = (red, green, blue), (3.0 + 2.0 * share) * pen
-    else:
-        path = zigzag(ends, 4.5 * pen, 5.0 * pen)
+    colour, width = look[0], look[1] * pen
+    path = ends if isinstance(force, LineMuscle) else zigzag(ends, 4.5 * pen, 5.0 * pen)
     corners = [tuple(corner) for corner in path]
     _stroke(draw, corners, WHITE, width + 2 * pen)
     _stroke(draw, corners, colour, width)
-    for (x, y), square in zip(ends, (False, force.to == SKULL), strict=True):
+    for (x, y), square in zip(
+        corners[:: len(corners) - 1], (False, force.to == SKULL), strict=True
+    ):
         half = max(2.5 * pen, 0.7 * width)
         shape = draw.rectangle if square else draw.ellipse
         shape((x - half, y - half, x + half, y + half), colour, WHITE)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dolfin_tongue.body.fibres import FloatArray
+from dolfin_tongue.base.arrays import FloatArray
 
 
 @dataclass(frozen=True)

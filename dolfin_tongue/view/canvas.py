@@ -11,12 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from dolfin_tongue.base.files import replacing
-from dolfin_tongue.view.scene3d import Pixels
-
-INK = (40, 40, 48)
-FAINT = (120, 120, 132)
-WHISKER = (22, 62, 150)
-WHITE = (255, 255, 255)
+from dolfin_tongue.view.palette import INK, WHITE, Pixels
 
 #: What the short names of muscles in published models stand for.
 ABBREVIATIONS = {
@@ -44,7 +39,7 @@ def save_image(image: Image.Image, path: Path | str) -> Path:
 
 @cache
 def font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans, which comes with matplotlib; size in pixels."""
+    """Load DejaVu Sans, which comes with matplotlib; size in pixels."""
     from matplotlib import font_manager
 
     properties = font_manager.FontProperties(

@@ -10,12 +10,12 @@ import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.march.state import State
+from dolfin_tongue.body.state import State
 from dolfin_tongue.view.camera import ABOVE, View
 from dolfin_tongue.view.canvas import milliseconds, save_image, sheet_of
 from dolfin_tongue.view.film import Film
-from dolfin_tongue.view.picture import FIELD_EDGES, Scale, draw_colour_bar
-from dolfin_tongue.view.scene3d import Pixels
+from dolfin_tongue.view.palette import FIELD_EDGES, Pixels
+from dolfin_tongue.view.picture import Scale, draw_colour_bar
 from dolfin_tongue.view.sheet import TILE_WIDTH
 
 #: Tissue that touches nothing: paler than elsewhere, so that colours stand out.

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageChops
 
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.body.fibres import FloatArray, MuscleFibres
+from dolfin_tongue.body.fibres import MuscleFibres
 from dolfin_tongue.view.camera import OBLIQUE, Camera
 from dolfin_tongue.view.canvas import Bar, length_bar, save_image, sheet_of, silhouette, spoken
-from dolfin_tongue.view.fields import deformation_gradients
-from dolfin_tongue.view.scene3d import OVERSAMPLING, Colour, Pixels, Stage
+from dolfin_tongue.view.fields import corner_means, deformation_gradients, half_lengths
+from dolfin_tongue.view.palette import Colour, Pixels
+from dolfin_tongue.view.scene3d import OVERSAMPLING, Stage
 
 #: Width of the picture of one muscle, and of its tile in the sheet, pixels.
 WIDTH, TILE_WIDTH = 640, 320
@@ -42,15 +44,14 @@ def fibre_segments(
     -------
     ndarray, shape (k, 2, 3), m -- three quarters as long as the cell is in that direction.
     """
-    corners = body.points[body.cells[muscle.cells]]
-    # The corners of a brick of edge L lie L/2 from its middle, along the edge.
-    along = np.einsum("kai,ki->ka", corners, muscle.directions)
-    half = 0.75 * along.std(axis=1)[:, None, None] * muscle.directions[:, None]
-    ends = corners.mean(axis=1)[:, None] + half * np.array([-1.0, 1.0])[:, None]
+    cells = muscle.cells
+    length = 0.75 * half_lengths(body, cells, muscle.directions)
+    half = length[:, None, None] * muscle.directions[:, None]
+    ends = corner_means(body, body.points)[cells][:, None] + half * np.array([-1.0, 1.0])[:, None]
     if displacement is None:
         return ends
     centre = ends.mean(axis=1, keepdims=True)
-    moved = centre + displacement[body.cells[muscle.cells]].mean(axis=1)[:, None]
+    moved = centre + corner_means(body, displacement)[cells][:, None]
     gradients = deformation_gradients(body, displacement)[muscle.cells]
     return moved + np.einsum("kij,kaj->kai", gradients, ends - centre)
 

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.body.fibres import FloatArray
-from dolfin_tongue.body.shape import shape_gradients
-
-_CENTRE = np.zeros((1, 3))
 
 
 def deformation_gradients(body: Body, displacement: FloatArray) -> FloatArray:
@@ -23,13 +20,34 @@ def deformation_gradients(body: Body, displacement: FloatArray) -> FloatArray:
     -------
     ndarray, shape (m, 3, 3).
     """
-    gradient = shape_gradients(_CENTRE)[0]
-    reference = np.einsum("mki,kj->mij", body.points[body.cells], gradient)
-    increment = np.einsum("mki,kj->mij", displacement[body.cells], gradient)
-    return np.eye(3) + increment @ np.linalg.inv(reference)
+    parts = []
+    for block in body.blocks:
+        centre = block.kind.nodes.mean(axis=0)[None]
+        reference, moved = (
+            block.kind.jacobians(x[block.cells], centre)[:, 0]
+            for x in (body.points, body.points + displacement)
+        )
+        parts.append(moved @ np.linalg.inv(reference))
+    return np.concatenate(parts)
 
 
-def largest_stretch(body: Body, displacement: FloatArray) -> np.ndarray:
+def largest_stretch(body: Body, displacement: FloatArray) -> FloatArray:
     """Largest principal stretch at the centres of the cells, shape (m,), dimensionless."""
     gradients = deformation_gradients(body, displacement)
     return np.linalg.svd(gradients, compute_uv=False)[:, 0]
+
+
+def corner_means(body: Body, values: FloatArray) -> FloatArray:
+    """Means over the corners of each cell of values at nodes, shape (n, k) -> (m, k)."""
+    return np.concatenate([values[block.corners].mean(axis=1) for block in body.blocks])
+
+
+def half_lengths(body: Body, cells: IntArray, directions: FloatArray) -> FloatArray:
+    """Half the extent of cells along directions (k, 3): exact for bricks along their edges."""
+    spread = np.zeros(body.cell_count)
+    along = np.zeros((body.cell_count, 3))
+    along[cells] = directions
+    for block in body.blocks:
+        heights = np.einsum("kai,ki->ka", body.points[block.corners], along[block.numbers])
+        spread[block.numbers] = heights.std(axis=1)
+    return spread[cells]

@@ -8,23 +8,15 @@ from types import TracebackType
 import numpy as np
 from PIL import Image, ImageDraw
 
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.base.errors import listing
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.body.fibres import FloatArray, IntArray
-from dolfin_tongue.march.state import State
+from dolfin_tongue.body.state import State
 from dolfin_tongue.view.camera import SIDE, Camera, View
-from dolfin_tongue.view.canvas import (
-    FAINT,
-    INK,
-    WHISKER,
-    WHITE,
-    Bar,
-    length_bar,
-    nice_below,
-    silhouette,
-)
-from dolfin_tongue.view.scene3d import EDGES, OVERSAMPLING, Colour, Pixels, Stage
-from dolfin_tongue.view.surface import Surface
+from dolfin_tongue.view.canvas import Bar, length_bar, nice_below, silhouette
+from dolfin_tongue.view.palette import EDGES, FAINT, INK, WHISKER, WHITE, Colour, Pixels
+from dolfin_tongue.view.scene3d import OVERSAMPLING, Stage
+from dolfin_tongue.view.skin import Skin
 from dolfin_tongue.view.surroundings import Neighbourhood, Surroundings
 
 #: Length of the velocity line of a fast node over the length of the body.
@@ -72,7 +64,7 @@ class Film:
     outline : whether the outline of the body at rest is drawn, faintly.
     whiskers : whether velocities of the nodes are drawn as lines.
     surroundings : walls and bones, if there are any.
-    cuts : see `Surface`.
+    cuts : see `Skin`.
     edges : colour of the element edges, 0-255.
     """
 
@@ -93,7 +85,7 @@ class Film:
         check_states(body, states)
         self.body = body
         self.fixed: IntArray = np.unique(np.concatenate([[], *map(body.nodes, fixed)]).astype(int))
-        self.surface = Surface(body, cuts)
+        self.surface = Skin(body, cuts)
         self.stretch = whisker_time(body, states) if whiskers else 0.0
         clouds = [body.points] if outline else []
         for state in states:
@@ -145,10 +137,10 @@ class Film:
         Parameters
         ----------
         state : of the body.
-        colours : ndarray, shape (points of the surface, 3) -- see `Surface.of_cells`.
+        colours : ndarray, shape (points of the surface, 3) -- see `Skin.of_cells`.
         """
         points = self.body.points + state.displacement
-        image = Image.fromarray(self.stage.frame(points, colours, self.near.shifts(state.time)))
+        image = Image.fromarray(self.stage.frame(points, colours, self.near.shifts(state)))
         if self._outline is not None:
             image.paste(FAINT, mask=self._outline)
         image = self.near.draw(image, self.camera, state)

@@ -11,17 +11,15 @@ from PIL import Image, ImageDraw
 
 from dolfin_tongue.base.errors import UnknownName
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.march.state import State
+from dolfin_tongue.body.state import State
 from dolfin_tongue.view.camera import OBLIQUE, Camera, View
-from dolfin_tongue.view.canvas import INK, draw_bars, font, length_bar, save_image, silhouette
+from dolfin_tongue.view.canvas import draw_bars, font, length_bar, save_image, silhouette
 from dolfin_tongue.view.fibres import fibre_segments, muscle_colour, see_through
 from dolfin_tongue.view.fields import largest_stretch
 from dolfin_tongue.view.film import check_states
-from dolfin_tongue.view.scene3d import EDGES, OVERSAMPLING, Pixels, Stage
+from dolfin_tongue.view.palette import EDGES, FIELD_EDGES, INK, Pixels
+from dolfin_tongue.view.scene3d import OVERSAMPLING, Stage
 from dolfin_tongue.view.surroundings import Neighbourhood, Surroundings
-
-#: Element edges on a field of colours.
-FIELD_EDGES = (90, 90, 96)
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,7 @@ def shape_picture(
     edges = EDGES if colour == "tissue" else FIELD_EDGES
     with Stage(body, camera, edge_colour=edges, edge_width=2.6, sheets=near.sheets) as stage:
         colours = None if colour == "tissue" else _colours(stage, SCALES[colour], state)
-        frame = stage.frame(points, colours, near.shifts(state.time))
+        frame = stage.frame(points, colours, near.shifts(state))
         image = near.draw(Image.fromarray(frame), camera, state).reduce(OVERSAMPLING)
         if bundles:
             alone = stage.frame(points) if near.sheets else frame
@@ -143,7 +141,7 @@ def shape_picture(
 def _colours(stage: Stage, scale: Scale, state: State) -> Pixels:
     """Colours of a field at the points of the surface."""
     values = scale.values(stage.body, state)
-    per_cell = len(values) == len(stage.body.cells)
+    per_cell = len(values) == stage.body.cell_count
     spread = stage.surface.of_cells if per_cell else stage.surface.of_nodes
     return scale.paint(spread(values[:, None])[:, 0], scale.limits(values))
 

@@ -134,8 +134,9 @@ def energy_plot(columns: Mapping[str, ArrayLike], path: Path | str) -> Path:
     balance, exchanged = table.pop("balance", None), table.pop("exchanged", None)
     with style():
         figure = new_figure(9, 5.4 if balance is None else 6.4)
-        axes = figure.subplots(1 if balance is None else 2, 1, sharex=True, squeeze=False,
-            height_ratios=[1.0] if balance is None else [3.2, 1.0])[:, 0]  # fmt: skip
+        ratios = [1.0] if balance is None else [3.2, 1.0]
+        rows = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)
+        axes = rows[:, 0]
         _draw_energies(axes[0], 1e3 * time, table)
         if balance is not None:
             _draw_balance(axes[1], 1e3 * time, balance, exchanged)

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.body.fibres import FloatArray
 from dolfin_tongue.view.camera import Camera
 from dolfin_tongue.view.display import ensure_display
-from dolfin_tongue.view.surface import Surface
-
-if TYPE_CHECKING:
-    from dolfin_tongue.view.surroundings import Sheet
+from dolfin_tongue.view.palette import EDGES, TISSUE, Colour, Pixels
+from dolfin_tongue.view.skin import Skin
+from dolfin_tongue.view.walls import Sheet
 
 #: Pictures are drawn so many times larger and then shrunk: smooth lines without multisampling.
 OVERSAMPLING = 2
-
-TISSUE = (233, 143, 135)
-EDGES = (140, 62, 60)
 
 #: Lights as the camera sees them (right, up, towards it): place and strength.
 LIGHTS = (((-0.5, 1.2, 1.2), 0.7), ((1.5, 0.2, 1.0), 0.3), ((0.0, -0.3, 1.0), 0.22))
@@ -31,9 +26,6 @@ LIGHTS = (((-0.5, 1.2, 1.2), 0.7), ((1.5, 0.2, 1.0), 0.3), ((0.0, -0.3, 1.0), 0.
 #: the cosine of the angle to the line of sight in this range.
 VEIL, SOLID = 0.16, 0.8
 FACING = (-0.3, 0.35)
-
-Pixels = npt.NDArray[np.uint8]
-Colour = tuple[int, int, int]
 
 
 class Stage:
@@ -54,7 +46,7 @@ class Stage:
         body: Body,
         camera: Camera,
         *,
-        surface: Surface | None = None,
+        surface: Skin | None = None,
         edge_colour: Colour = EDGES,
         edge_width: float = 1.6,
         sheets: Sequence[Sheet] = (),
@@ -63,7 +55,7 @@ class Stage:
         import pyvista
 
         self.body, self.camera = body, camera
-        self.surface = surface or Surface(body)
+        self.surface = surface or Skin(body)
         self.plotter: Any = pyvista.Plotter(
             off_screen=True, window_size=camera.size, lighting="none"
         )
@@ -179,7 +171,7 @@ class Stage:
         Parameters
         ----------
         points : ndarray, shape (n, 3), m -- nodes of the deformed body.
-        colours : ndarray, shape (points of the surface, 3) -- see `Surface.of_cells`.
+        colours : ndarray, shape (points of the surface, 3) -- see `Skin.of_cells`.
         shifts : ndarray, shape (s, 3), m -- translations of the walls; without them no wall is
             drawn.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dolfin_tongue.body.body import Body
-from dolfin_tongue.march.state import State
+from dolfin_tongue.body.state import State
 from dolfin_tongue.view.canvas import milliseconds, save_image, sheet_of, spoken
 from dolfin_tongue.view.film import Film
 from dolfin_tongue.view.surroundings import Surroundings
@@ -69,7 +69,7 @@ def contact_sheet(
     return save_image(sheet_of(tiles, texts, columns, title, bars), path)
 
 
-def telling_frames(states: Sequence[State], count: int) -> list[State]:
+def key_frames(states: Sequence[State], count: int) -> list[State]:
     """Choose frames for a sheet: more of them where the body moves, fewer where it rests.
 
     Parameters

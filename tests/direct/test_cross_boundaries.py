@@ -10,25 +10,17 @@ from cases import apply_matrices, relative
 
 from benchmarks.extremes.proofs import hinged_bone
 from dolfin_tongue.base.errors import BadScene
-from dolfin_tongue.boundary import (
-    Barrier,
-    Contact,
-    Gravity,
-    ReportContact,
-    Sliding,
-    moved_onto,
-)
+from dolfin_tongue.body.state import State
+from dolfin_tongue.boundary import Barrier, Contact, Gravity, ReportContact, Sliding, moved_onto
 from dolfin_tongue.boundary.sliding import off_surface
 from dolfin_tongue.constitutive import MooneyRivlin, Viscosity
-from dolfin_tongue.control import Constant, SmoothMove, Still, Swing
-from dolfin_tongue.direct import Direct, Implicit, Model, problem_of
+from dolfin_tongue.control import Constant, Instant, SmoothMove, Still, Swing
+from dolfin_tongue.direct import Model, TrBdf2
 from dolfin_tongue.geometry.simple import block_body, distort
 from dolfin_tongue.march.compare import orders
-from dolfin_tongue.march.state import State
 from dolfin_tongue.rigid import AngularSpring, LineMuscle, RigidBody
 from dolfin_tongue.scene.scene import Scene
-from dolfin_tongue.surfaces import Cylinder, Plane, Sphere
-from dolfin_tongue.surfaces import Implicit as ImplicitSurface
+from dolfin_tongue.surfaces import Cylinder, Implicit, Plane, Sphere
 
 pytest.importorskip("dolfinx")
 
@@ -66,27 +58,29 @@ def random_state(scene: Scene, seed: int) -> State:
 @pytest.mark.parametrize("seed", [0, 1])
 def test_forces_on_bones_and_sliding_nodes_agree(seed):
     """The FEniCSx side is given the displacements that the bones give their nodes."""
-    from dolfin_tongue.fenicsx.couplings import RigidBodies
-    from dolfin_tongue.fenicsx.system import System
+    from dolfin_tongue.fenicsx import System
+    from dolfin_tongue.fenicsx.arguments import Arguments
+    from dolfin_tongue.fenicsx.rigid import RigidBodies
 
     scene = carried_block()
-    model, system = Model(problem_of(scene)), System(scene, dynamic=True)
+    model, system = Model(scene), System(scene, dynamic=True)
     state = random_state(scene, seed)
     u, v = model.rows(state)
     count = len(scene.body.points)
     state = replace(state, displacement=u[:count], velocity=v[:count])
     acceleration = np.random.default_rng(seed).uniform(-5, 5, state.displacement.shape)
+    now = Instant(state.time)
     y, rate = system.vectors(state)
-    y_two = system.mixed(acceleration)
-    system.set_state(state.time, y, rate, y_two, y)
-    rows = system.reactions(state.time)
+    at = Arguments(now, now.time, y, rate, system.vector(acceleration), y)
+    rows = system.reactions(at)
     (rigid,) = (part for part in system.couplings if isinstance(part, RigidBodies))
     theirs = rigid.tissue_force(state.rigid.ravel(), rows).reshape(-1, 3)
     ours = model.force_on_bodies(state, acceleration)
     assert relative(ours, theirs) <= 1e-12
     # The rows of free nodes, sliding ones among them.
-    force = model.force(state.time, u, v)
-    model.add_constraint_force(model.constraint_gradients(u), model.multipliers(state), force)
+    force = model.force(now, u, v)
+    gradients = model.constraints.gradients(u)
+    model.constraints.add_force(gradients, model.numbering.multipliers(state), force)
     mine = (force[:count] - model.mass[:count, :count] @ acceleration)[scene_free(scene)]
     assert relative(mine, -system.displacement(rows)[scene_free(scene)]) <= 1e-12
 
@@ -110,28 +104,30 @@ CONTACTS = {
 def test_forces_and_tangents_of_contact_agree(name):
     from petsc4py import PETSc
 
-    from dolfin_tongue.fenicsx.system import System
+    from dolfin_tongue.fenicsx import System
+    from dolfin_tongue.fenicsx.arguments import Arguments, Shifts
 
     body = distort(block_body((0.03, 0.02, 0.02), (3, 2, 2)), 5e-4)
     scene = Scene(body, (CONTACTS[name],))
-    model, system = Model(problem_of(scene)), System(scene, dynamic=True)
+    model, system = Model(scene), System(scene, dynamic=True)
     rng = np.random.default_rng(3)
     u, v = 3e-4 * rng.uniform(-1, 1, body.points.shape), 0.1 * rng.uniform(-1, 1, body.points.shape)
-    y, rate, time = system.mixed(u), system.mixed(v), 0.03
-    system.set_state(time, y, rate, 0 * y, y)
+    y, rate, now = system.vector(u), system.vector(v), Instant(0.03)
+    at = Arguments(now, now.time, y, rate, 0 * y, y)
     out = np.zeros(system.size)
-    system.residual(time, out)
-    force = model.force(time, u, v)
+    system.residual(at, out)
+    force = model.force(now, u, v)
     assert np.abs(force).max() > 1e-4
     assert relative(force, -system.displacement(out)) <= 1e-12
     matrix = system.new_matrix()
     way = rng.uniform(-1, 1, u.shape)
     for shift in (0.0, 130.0):
-        system.jacobian(matrix, (shift, 0.0, 1.0), time)
-        x = PETSc.Vec().createWithArray(system.mixed(way))
+        system.jacobian(at, Shifts(shift, 0.0, 1.0), matrix)
+        x = PETSc.Vec().createWithArray(system.vector(way))
         image = x.duplicate()
         matrix.mult(x, image)
-        ours = apply_matrices(model, model.element_tangents(time, u, v, 1.0, shift), way)
+        tangents = model.element_tangents(model.at(now, u, v), 1.0, shift)
+        ours = apply_matrices(model, tangents, way)
         assert relative(ours, system.displacement(image.array_r)) <= 1e-12
 
 
@@ -143,12 +139,12 @@ def scene_free(scene: Scene) -> np.ndarray:
 @pytest.mark.parametrize("make", [hinged_bone, carried_block])
 def test_motions_converge_to_each_other(make):
     """At order 2: differences of nodes and coordinates fall to a quarter with half the step."""
-    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx import GeneralisedAlpha
 
     scene, steps, gaps = make(), (2e-3, 1e-3, 5e-4), []
-    *_, fine = Direct(scene, Implicit(1e-4, newton=1e-11)).march(0.04)
+    *_, fine = TrBdf2(1e-4, newton=1e-11).solver(scene).march(0.04)
     for dt in steps:
-        *_, last = Dynamics(scene, TimeSteps(dt)).march(0.04)
+        *_, last = GeneralisedAlpha(dt).solver(scene).march(0.04)
         turn = 0.05 * np.abs(last.rigid[:, 2] - fine.rigid[:, 2]).max()
         gaps.append(max(float(np.abs(last.displacement - fine.displacement).max()), turn))
     assert min(orders(steps, gaps)) > 1.8, gaps
@@ -157,9 +153,9 @@ def test_motions_converge_to_each_other(make):
 
 @pytest.mark.parametrize("solver", ["fenicsx", "direct"])
 def test_a_body_may_come_up_behind_the_rim_of_a_sheet(solver, tmp_path):
-    """A block falls from above a wall's rim to behind the wall, and goes on as if it were not there."""
+    """A block falls from above a wall's rim to behind the wall, as if it were not there."""
     from dolfin_tongue.app.pictures import read_table
-    from dolfin_tongue.fenicsx.generalised_alpha import TimeSteps
+    from dolfin_tongue.fenicsx import GeneralisedAlpha
     from dolfin_tongue.record.run import simulate
     from dolfin_tongue.surfaces import Triangulated
 
@@ -176,8 +172,8 @@ def test_a_body_may_come_up_behind_the_rim_of_a_sheet(solver, tmp_path):
     gap = wall.gap(np.array([[0.01, 0.02, -0.02], [0.01, 0.021, -0.02], [0.01, 0.02, 0.0]]))
     assert gap.distance[0] < 0 < gap.distance[1] < gap.distance[2] == np.inf
     scene = Scene(body, (MooneyRivlin(), Viscosity(20.0), Gravity(), Contact(wall, "y1")))
-    steps = TimeSteps(5e-3) if solver == "fenicsx" else Implicit(5e-3)
-    run = simulate(scene, 0.08, tmp_path, steps)
+    method = GeneralisedAlpha(5e-3) if solver == "fenicsx" else TrBdf2(5e-3)
+    run = simulate(scene, 0.08, tmp_path, method)
     fallen = run.last.displacement[:, 2]
     assert np.abs(fallen + 0.5 * 9.81 * 0.08**2).max() < 1e-5
     table = read_table(tmp_path / "steps.csv")
@@ -186,15 +182,15 @@ def test_a_body_may_come_up_behind_the_rim_of_a_sheet(solver, tmp_path):
 
 def test_the_size_of_g_does_not_matter():
     """The same bowl as a function of another scale and unit, in both solvers; lambda is smaller."""
-    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx import GeneralisedAlpha
 
     body = moved_onto(block_body((0.02, 0.02, 0.02), (2, 2, 2)), BOWL, "z0")
     centre = np.asarray(BOWL.centre)
-    other = ImplicitSurface(lambda x: 1e7 * (BOWL.radius**2 - ((x - centre) ** 2).sum(axis=1)))
+    other = Implicit(lambda x: 1e7 * (BOWL.radius**2 - ((x - centre) ** 2).sum(axis=1)))
     ends = []
     for surface in (BOWL, other):
         scene = Scene(body, (MooneyRivlin(), Gravity((3.0, 0.0, -9.0))), (Sliding(surface, "z0"),))
-        for solver in (Dynamics(scene, TimeSteps(5e-3)), Direct(scene, Implicit(5e-3))):
+        for solver in (GeneralisedAlpha(5e-3).solver(scene), TrBdf2(5e-3).solver(scene)):
             *_, last = solver.march(0.03)
             places = (body.points + last.displacement)[body.nodes("z0")]
             assert np.abs(off_surface(surface, places)).max() <= 1e-9
@@ -210,16 +206,15 @@ def test_the_size_of_g_does_not_matter():
 @pytest.mark.parametrize("solver", ["fenicsx", "direct"])
 def test_a_steady_push_creeps_through_the_reports_law(solver):
     """(60) has no force at rest: it slows the block and lets it pass, alike in both solvers."""
-    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx import GeneralisedAlpha
 
     body = block_body((0.02, 0.02, 0.01), (2, 2, 1))
     law = ReportContact(a1=3e6, range=5e-4)
     wall = Contact(Plane((0.0, 0.0, -3e-4)), "z0", law)
     scene = Scene(body, (MooneyRivlin(), Viscosity(20.0), Gravity(), wall))
-    stepper = (
-        Dynamics(scene, TimeSteps(4e-3)) if solver == "fenicsx" else Direct(scene, Implicit(4e-3))
-    )
-    heights = [state.displacement[body.nodes("z0"), 2].mean() for state in stepper.march(0.2)]
+    method = GeneralisedAlpha(4e-3) if solver == "fenicsx" else TrBdf2(4e-3)
+    states = method.solver(scene).march(0.2)
+    heights = [state.displacement[body.nodes("z0"), 2].mean() for state in states]
     assert heights[-1] < -3.2e-4  # behind the plane
     assert heights[-1] > -0.1 * 0.5 * 9.81 * 0.2**2  # far from free fall
 

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cases import CENTIMETRE, distorted_element, mesh_model, mixed_mesh, random_state, relative
+from cases import (
+    CENTIMETRE,
+    body_model,
+    body_of,
+    distorted_element,
+    element_model,
+    mixed_body,
+    random_state,
+    relative,
+)
 
 from dolfin_tongue.base.errors import BadMesh, UnknownName
+from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.cells import HEXAHEDRON8, KINDS
 from dolfin_tongue.constitutive import ReportTissue
-from dolfin_tongue.direct.elements import BRICK8, KINDS
-from dolfin_tongue.direct.mesh import Mesh
+from dolfin_tongue.control import Instant
 from dolfin_tongue.direct.volume import element_gradient, element_hessian, element_volume
 
 NAMES = sorted(KINDS)
@@ -34,7 +44,7 @@ def test_kappa_of_the_brick_is_the_report_s_table():
         for k, m, n in triples:
             for a, b, c in ((k, m, n), (m, n, k), (n, k, m)):
                 expected[a, b, c], expected[b, a, c] = value, -value
-    np.testing.assert_allclose(BRICK8.kappa, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(HEXAHEDRON8.kappa, expected, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -93,7 +103,7 @@ def test_the_rule_integrates_the_volume_exactly(name):
 
 def _to_master(name: str, x: float, y: float, z: float) -> tuple[np.ndarray, float]:
     """Point of the master element from the unit cube (collapsed for simplices), its factor."""
-    if name.startswith("brick"):
+    if name.startswith("hexahedron"):
         return 2 * np.array([x, y, z]) - 1, 8.0
     if name == "prism6":
         return np.array([x, y * (1 - x), 2 * z - 1]), 2 * (1 - x)
@@ -147,59 +157,57 @@ def _second_moment(name: str, corners: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
 def test_lumped_mass_is_positive_and_complete(mass):
-    corners = distorted_element("brick20")
-    mesh = Mesh(corners, {"brick20": np.arange(20)[None]})
-    matrix = mesh_model(mesh, ReportTissue(), mass=mass).mass
-    volume = element_volume(KINDS["brick20"], corners)
+    corners = distorted_element("hexahedron20")
+    matrix = element_model("hexahedron20", ReportTissue(), mass=mass).mass
+    volume = element_volume(KINDS["hexahedron20"], corners)
     np.testing.assert_allclose(matrix.sum(), 1000.0 * volume, rtol=1e-12)
     assert matrix.diagonal().min() > 0
     assert (matrix.nnz == 20) == (mass == "lumped")
 
 
 def test_mixed_mesh_volume_and_gradient():
-    model = mesh_model(mixed_mesh(0.1), ReportTissue())
-    displacement, _ = random_state(model.mesh.points)
-    change, gradients = model.constraint(displacement)
-    again = Mesh(model.mesh.points + displacement, dict(model.mesh.cells))
-    volumes = np.concatenate([block.weights.sum(axis=1) for block in again.blocks])
-    np.testing.assert_allclose(change, volumes - model.rest_volumes, atol=1e-12 * volumes.max())
+    model = body_model(mixed_body(0.1), ReportTissue())
+    displacement, _ = random_state(model.body.points)
+    change, gradients = model.constraints.evaluate(displacement)
+    volumes = body_of(model.body.points + displacement, model.body.cells).volumes
+    np.testing.assert_allclose(change, volumes - model.body.volumes, atol=1e-12 * volumes.max())
     # A conforming mesh: the volumes add up to a function of the surface, inner nodes have no part.
     total = np.zeros_like(displacement)
-    model.add_constraint_force(gradients, np.ones(model.cell_count), total)
+    model.constraints.add_force(gradients, np.ones(model.body.cell_count), total)
     np.testing.assert_allclose(total.sum(axis=0), 0.0, atol=1e-15)
 
 
 def test_patch_of_mixed_elements_is_in_equilibrium():
-    mesh = inner_node_mesh()
-    model = mesh_model(mesh, ReportTissue())
+    points = inner_node_body().points
+    model = body_model(inner_node_body(), ReportTissue())
     gradient = np.array([[0.1, 0.2, 0.0], [0.0, -0.1, 0.1], [0.05, 0.0, 0.15]])
-    force = model.force(0.0, mesh.points @ gradient.T, np.zeros_like(mesh.points))
+    force = model.force(Instant(0.0), points @ gradient.T, np.zeros_like(points))
     assert np.abs(force[-1]).max() <= 1e-13 * np.abs(force).max()
     np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-13 * np.abs(force).max())
 
 
-def inner_node_mesh() -> Mesh:
+def inner_node_body() -> Body:
     """Four tetrahedra around an inner node, and a prism on one outer face."""
     corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
     below = corner[[0, 1, 2]] - [0.1, 0.0, 0.8]
     points = np.concatenate([corner, below, [[0.3, 0.2, 0.25]]])
     tetrahedra = np.array([[7, 1, 2, 3], [0, 7, 2, 3], [0, 1, 7, 3], [0, 1, 2, 7]])
-    return Mesh(
+    return body_of(
         CENTIMETRE * points,
         {"tetrahedron4": tetrahedra, "prism6": np.array([[4, 5, 6, 0, 1, 2]])},
     )
 
 
-def test_wrong_meshes_are_refused():
-    cells = np.arange(8)[None]
-    with pytest.raises(UnknownName, match=r"unknown element kind 'hexahedron'.*brick20"):
-        Mesh(BRICK8.nodes, {"hexahedron": cells})
-    with pytest.raises(BadMesh, match=r"brick8: cells must have shape \(m, 8\)"):
-        Mesh(BRICK8.nodes, {"brick8": cells[:, :6]})
-    with pytest.raises(BadMesh, match="the cells use 8 nodes, there are 9 points"):
-        Mesh(np.concatenate([BRICK8.nodes, [[5.0, 5, 5]]]), {"brick8": cells})
-    with pytest.raises(BadMesh, match=r"inverted brick8 cell\(s\).*: 0"):
-        Mesh(BRICK8.nodes, {"brick8": cells[:, [0, 3, 2, 1, 4, 7, 6, 5]]})
+def test_wrong_cells_are_refused():
+    points, cells = CENTIMETRE * HEXAHEDRON8.nodes, np.arange(8)[None]
+    with pytest.raises(UnknownName, match=r"unknown kind of cells 'hexahedron'.*hexahedron20"):
+        Body(points, {"hexahedron": cells})
+    with pytest.raises(BadMesh, match=r"cells of hexahedron8 must have shape \(m, 8\)"):
+        Body(points, {"hexahedron8": cells[:, :6]})
+    with pytest.raises(BadMesh, match=r"node\(s\) 8 belong to no cell"):
+        Body(np.concatenate([points, [[0.05, 0.05, 0.05]]]), {"hexahedron8": cells})
+    with pytest.raises(BadMesh, match=r"inverted hexahedron8 cell\(s\).*: 0"):
+        Body(points, {"hexahedron8": cells[:, [0, 3, 2, 1, 4, 7, 6, 5]]})
 
 
 def test_relative_is_a_measure_of_error():

@@ -4,25 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cases import TERMS, apply_matrices, element_model, mesh_model, mixed_mesh, name_of, relative
+from cases import (
+    TERMS,
+    apply_matrices,
+    body_model,
+    element_model,
+    energy_of,
+    load_of,
+    mixed_body,
+    name_of,
+    relative,
+)
 
 from dolfin_tongue.base.errors import NoDirectForce, OutOfRange
+from dolfin_tongue.body.cells import KINDS
 from dolfin_tongue.boundary import Gravity
 from dolfin_tongue.constitutive import ReportTissue, Viscosity
-from dolfin_tongue.direct import KINDS, Direct, Model, Problem, RungeKutta4
+from dolfin_tongue.control import Instant
+from dolfin_tongue.direct import Model, RungeKutta4
 from dolfin_tongue.geometry.simple import block_body
 from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.terms.term import EnergyTerm, Term
 
 NAMES = sorted(KINDS)
-TIME = 0.03
+NOW = Instant(0.03)
 INNER = [term for term in TERMS if not isinstance(term, Gravity)]
 
 
 def state_of(model: Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of 5 % of a centimetre and velocity of every node."""
     random = np.random.default_rng(seed)
-    shape = model.mesh.points.shape
+    shape = model.body.points.shape
     return 5e-4 * random.uniform(-1, 1, shape), 0.2 * random.uniform(-1, 1, shape)
 
 
@@ -37,9 +49,9 @@ def central(function, step: float) -> np.ndarray:
 def test_force_is_minus_the_gradient_of_the_energy(term, name):
     model = element_model(name, term)
     u, _ = state_of(model)
-    still, force = np.zeros_like(u), model.force(TIME, u, np.zeros_like(u))
+    still, force = np.zeros_like(u), model.force(NOW, u, np.zeros_like(u))
     direction = state_of(model, 1)[0]
-    slope = central(lambda s: model.energy(u + s * direction, still), 1e-3)
+    slope = central(lambda s: energy_of(model, NOW.time, u + s * direction, still), 1e-3)
     assert abs(slope + np.sum(force * direction)) <= 1e-8 * np.abs(force * direction).sum()
 
 
@@ -50,41 +62,41 @@ def test_tangents_are_the_derivatives_of_the_force(term, name):
     u, v = state_of(model)
     direction, _ = state_of(model, 1)
     for factor, rate_factor in ((1.0, 0.0), (0.0, 1.0), (0.3, 0.7)):
-        matrices = model.element_tangents(TIME, u, v, factor, rate_factor)
+        matrices = model.element_tangents(model.at(NOW, u, v), factor, rate_factor)
         stiffness = apply_matrices(model, matrices, direction)
         # The matrix acts on one vector: its rate part sees the same direction.
-        expected = -factor * central(lambda s: model.force(TIME, u + s * direction, v), 1e-3)
-        expected -= rate_factor * central(lambda s: model.force(TIME, u, v + s * direction), 1.0)
-        scale = max(np.abs(expected).max(), np.abs(model.force(TIME, u, v)).max() * 1e-3)
+        expected = -factor * central(lambda s: model.force(NOW, u + s * direction, v), 1e-3)
+        expected -= rate_factor * central(lambda s: model.force(NOW, u, v + s * direction), 1.0)
+        scale = max(np.abs(expected).max(), np.abs(model.force(NOW, u, v)).max() * 1e-3)
         assert np.abs(stiffness - expected).max() <= 1e-7 * scale
 
 
 @pytest.mark.parametrize("term", INNER, ids=name_of)
 def test_inner_forces_of_a_free_body_balance(term):
-    model = mesh_model(mixed_mesh(0.1), term)
+    model = body_model(mixed_body(0.1), term)
     u, v = state_of(model)
-    force = model.force(TIME, u, v)
-    moment = np.cross(model.mesh.points + u, force)
+    force = model.force(NOW, u, v)
+    moment = np.cross(model.body.points + u, force)
     assert np.abs(force.sum(axis=0)).max() <= 1e-13 * np.abs(force).sum()
     assert np.abs(moment.sum(axis=0)).max() <= 1e-13 * np.abs(moment).sum()
 
 
 @pytest.mark.parametrize("term", INNER, ids=name_of)
 def test_forces_turn_with_the_body(term):
-    model = mesh_model(mixed_mesh(0.1), term)
+    model = body_model(mixed_body(0.1), term)
     u, v = state_of(model)
     turn, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     spin = np.array([[0, -3.0, 1], [3, 0, -2], [-1, 2, 0]])
-    x = (model.mesh.points + u) @ turn.T
-    turned = model.force(TIME, x - model.mesh.points, v @ turn.T + x @ spin.T)
-    assert relative(turned, model.force(TIME, u, v) @ turn.T) <= 1e-12
+    x = (model.body.points + u) @ turn.T
+    turned = model.force(NOW, x - model.body.points, v @ turn.T + x @ spin.T)
+    assert relative(turned, model.force(NOW, u, v) @ turn.T) <= 1e-12
 
 
 def test_gravity_is_the_weight():
-    model = mesh_model(mixed_mesh(0.1), Gravity())
-    weight = model.load.sum(axis=0)
-    mass = 1000.0 * model.rest_volumes.sum()
+    model = body_model(mixed_body(0.1), Gravity())
+    weight = load_of(model).sum(axis=0)
+    mass = 1000.0 * model.body.volumes.sum()
     np.testing.assert_allclose(weight, [0, 0, -9.81 * mass], rtol=1e-12, atol=1e-15)
 
 
@@ -94,13 +106,14 @@ def test_a_term_that_is_absent_is_not_evaluated(monkeypatch):
 
     for kernel in ("viscous_stress", "active_stress", "viscous_moduli", "active_moduli"):
         monkeypatch.setattr(f"dolfin_tongue.direct.rates.{kernel}", fail)
-    model = mesh_model(mixed_mesh(), ReportTissue())
+    model = body_model(mixed_body(), ReportTissue())
     u, v = state_of(model)
-    assert not model.rated
-    assert model.strains(u, v)[0][1] is None
-    model.force(0.0, u, v)
+    assert not model.rate_dependent
+    F, rate = model.at(NOW, u, v).strains[0]
+    assert rate is F
+    model.force(NOW, u, v)
     with pytest.raises(AssertionError, match="evaluated"):
-        mesh_model(mixed_mesh(), Viscosity(1.0)).force(0.0, u, v)
+        body_model(mixed_body(), Viscosity(1.0)).force(NOW, u, v)
 
 
 def test_a_term_without_a_force_is_refused_by_name():
@@ -114,9 +127,9 @@ def test_a_term_without_a_force_is_refused_by_name():
     body = block_body(cells=(1, 1, 1))
     for term in (Magnetism(), StifferTissue()):
         with pytest.raises(NoDirectForce, match=type(term).__name__):
-            Direct(Scene(body, (term,)), RungeKutta4(1e-4))
+            RungeKutta4(1e-4).solver(Scene(body, (term,)))
 
 
 def test_an_unknown_mass_is_refused():
     with pytest.raises(OutOfRange, match="consistent"):
-        Model(Problem(mixed_mesh(), (ReportTissue(),), 1000.0), mass="diagonal")
+        body_model(mixed_body(), ReportTissue(), mass="diagonal")

@@ -9,7 +9,7 @@ from cases import relative
 from dolfin_tongue.boundary import Attached, Gravity
 from dolfin_tongue.constitutive import ActiveMuscles, ReportTissue, Viscosity
 from dolfin_tongue.control import SmoothRamp
-from dolfin_tongue.direct import Adaptive, Direct, Implicit
+from dolfin_tongue.direct import Adaptive, TrBdf2
 from dolfin_tongue.geometry.simple import block_body
 from dolfin_tongue.scene.scene import Scene
 
@@ -29,16 +29,16 @@ def scene() -> Scene:
 @pytest.fixture(scope="module")
 def reference(scene):
     """Tight direct solution."""
-    *_, state = Direct(scene, Adaptive(1e-12, rtol=1e-11)).march(END)
+    *_, state = Adaptive(1e-12, rtol=1e-11).solver(scene).march(END)
     return state
 
 
 def test_difference_falls_at_order_2(scene, reference):
-    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx import GeneralisedAlpha
 
     error = []
     for dt in (1e-3, 5e-4, 2.5e-4):
-        *_, state = Dynamics(scene, TimeSteps(dt=dt)).march(END)
+        *_, state = GeneralisedAlpha(dt=dt).solver(scene).march(END)
         error.append(
             [
                 relative(getattr(state, name), getattr(reference, name))
@@ -52,14 +52,14 @@ def test_difference_falls_at_order_2(scene, reference):
 
 
 def test_pressures_agree_with_the_multipliers(scene, reference):
-    from dolfin_tongue.fenicsx.generalised_alpha import Dynamics, TimeSteps
+    from dolfin_tongue.fenicsx import GeneralisedAlpha
 
-    *_, state = Dynamics(scene, TimeSteps(dt=2.5e-4)).march(END)
+    *_, state = GeneralisedAlpha(dt=2.5e-4).solver(scene).march(END)
     assert np.abs(reference.pressure).max() > 100.0  # Pa: not the trivial agreement of zeros
     assert relative(state.pressure, reference.pressure) <= 2e-3
 
 
 def test_the_implicit_direct_method_gives_that_motion_too(scene, reference):
-    *_, state = Direct(scene, Implicit(5e-4, newton=1e-11)).march(END)
+    *_, state = TrBdf2(5e-4, newton=1e-11).solver(scene).march(END)
     for name, bound in (("displacement", 5e-4), ("velocity", 2e-2), ("pressure", 1e-3)):
         assert relative(getattr(state, name), getattr(reference, name)) <= bound

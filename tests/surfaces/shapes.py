@@ -3,6 +3,9 @@
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from dolfin_tongue.surfaces.nearest import tree_of
+from dolfin_tongue.surfaces.samples import signed_distance
+
 #: Corners of a cube of edge 2, and its triangles, outward.
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
@@ -46,3 +49,8 @@ def sheet(size=0.04, count=9, height=lambda x, y: 0 * x):
     lower = np.stack([corner, corner + count, corner + count + 1], axis=1)
     upper = np.stack([corner, corner + count + 1, corner + 1], axis=1)
     return np.stack([x, y, height(x, y)], axis=1), np.concatenate([lower, upper])
+
+
+def exact(points, triangles, places):
+    """Signed distance of places from triangles, and whether they are not beyond a rim."""
+    return signed_distance(points, triangles, tree_of(points[triangles]), places)
