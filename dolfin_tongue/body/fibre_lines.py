@@ -1,72 +1,113 @@
-"""Lengths of muscle fibres: lines traced through the direction field of a muscle.
+"""Lengths of muscle fibres: lines traced through the cells of a muscle.
 
 A muscle of parallel fibres of length l and volume V has the cross-section V / l. In a field of
 directions each point has a fibre of its own length l(X), and the muscle the cross-section
 int dV / l(X). So its force is int T dV / l with the tension T along the fibres: each fibre counts
 with its own cross-section.
+
+A direction is constant in a cell, so that a fibre is straight there: it leaves the cell through the
+face that it meets first, and goes on in the neighbour, until it leaves the cells of the muscle or
+would turn back. A face that is not plane counts as the plane through the middle of its corners.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.spatial import cKDTree
 
-from dolfin_tongue.base.arrays import FloatArray, sums_at
+from dolfin_tongue.base.arrays import FloatArray, IntArray
 from dolfin_tongue.body.body import Body
+from dolfin_tongue.body.faces import all_faces, corners_of
 
-#: Step of the lines, in edges of a cube of the mean volume of the muscle's cells.
-STEP = 0.1
-
-#: Most steps of a line in one direction.
-MOST_STEPS = 2000
+#: Most cells that a line crosses in one direction: one that circles would never end.
+MOST_CELLS = 10_000
 
 
 def fibre_lengths(body: Body, muscle: str) -> FloatArray:
     """Length of the fibre through the centre of each cell of a muscle, shape (k,), m.
-
-    Lines follow the direction of the cell in which they are (the one with the nearest quadrature
-    point) until they leave the cells of the muscle; to about a tenth of a cell.
 
     Parameters
     ----------
     body : the body.
     muscle : its name; UnknownName lists the known ones.
     """
-    fibres = body.fibres[muscle]
-    places = np.concatenate([block.places.reshape(-1, 3) for block in body.blocks])
-    owner = np.repeat(np.arange(body.cell_count), body.point_counts)
-    tree = cKDTree(places)
-    number = np.full(body.cell_count, -1)
-    number[fibres.cells] = np.arange(len(fibres.cells))
-    weights = np.concatenate([block.weights.ravel() for block in body.blocks])
-    sums = [sums_at(owner, weights * x) for x in places.T]
-    centres = (np.stack(sums, axis=1) / body.volumes[:, None])[fibres.cells]
-    step = STEP * float(body.volumes[fibres.cells].mean()) ** (1 / 3)
-    lengths = np.zeros(len(centres))
+    fibres, walls = body.fibres[muscle], _Walls.of(body)
+    directions = np.full((body.cell_count, 3), np.nan)
+    directions[fibres.cells] = fibres.directions
+    lengths = np.zeros(len(fibres.cells))
     for sign in (1.0, -1.0):
-        x, way = centres.copy(), sign * fibres.directions
-        inside = np.arange(len(centres))
-        for _ in range(MOST_STEPS):
-            x[inside] += step * way[inside]
-            distance, nearest = tree.query(x[inside])
-            at = number[owner[nearest]]
-            # the surface is not farther from a quadrature point than its cell is wide
-            reach = body.volumes[owner[nearest]] ** (1 / 3)
-            stays = (at >= 0) & (distance < _outside(reach))
-            lengths[inside[stays]] += step
-            inside, at = inside[stays], at[stays]
-            if not inside.size:
+        active, cell = np.arange(len(fibres.cells)), fibres.cells
+        place, way = walls.centres[cell], sign * fibres.directions
+        before = np.full(len(cell), -1)
+        for _ in range(MOST_CELLS):
+            length, following = walls.leave(cell, place, way)
+            lengths[active] += length
+            turned = directions[following]
+            # NaN outside of the muscle; -1 outside of the body is the last cell, or NaN too
+            on = (following >= 0) & (following != before) & np.isfinite(turned[:, 0])
+            if not on.any():
                 break
-            turned = fibres.directions[at]
-            along = np.sign((turned * way[inside]).sum(axis=1))
-            way[inside] = np.where(along == 0, 1.0, along)[:, None] * turned
-    return np.maximum(lengths + step, step)
+            place = (place + length[:, None] * way)[on]
+            along = (turned * way).sum(axis=1)[on]
+            way = np.where(along < 0, -1.0, 1.0)[:, None] * turned[on]
+            before, cell, active = cell[on], following[on], active[on]
+    return lengths
 
 
-def _outside(width: FloatArray) -> FloatArray:
-    """Distance from the nearest quadrature point beyond which a place counts as outside, m.
+@dataclass(frozen=True, eq=False)
+class _Walls:
+    """Faces of all cells as planes.
 
-    A corner of a cube of width 1 is 0.37 from the nearest of its 2x2x2 Gauss points, the middle of
-    a face 0.46: half a width lies between inside and the next cell that is not there.
+    Parameters
+    ----------
+    centres : ndarray, shape (m, 3), m -- middle of the corners of each cell.
+    faces : ndarray, shape (m, f) -- numbers of the faces of each cell; the last one again where a
+        cell has fewer.
+    middles, normals : ndarray, shape (k, 3) -- of the faces, m and m2; outward.
+    others : ndarray, shape (k,) -- the cell beyond each face; -1 for none.
     """
-    return 0.45 * width
+
+    centres: FloatArray
+    faces: IntArray
+    middles: FloatArray
+    normals: FloatArray
+    others: IntArray
+
+    @classmethod
+    def of(cls, body: Body) -> _Walls:
+        """Those of a body."""
+        faces, owners = all_faces(body.cells_by_kind)
+        order = np.argsort(owners, kind="stable")
+        faces, owners = faces[order], owners[order]
+        first = np.searchsorted(owners, np.arange(body.cell_count))
+        count = np.bincount(owners)
+        table = first[:, None] + np.minimum(np.arange(count.max()), count[:, None] - 1)
+        corners = body.points[corners_of(faces)]
+        normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        centres = np.concatenate([body.points[b.corners].mean(axis=1) for b in body.blocks])
+        return cls(centres, table, corners.mean(axis=1), normals, _beyond(faces, owners))
+
+    def leave(
+        self, cell: IntArray, place: FloatArray, way: FloatArray
+    ) -> tuple[FloatArray, IntArray]:
+        """How far it is along unit vectors to the way out of cells, m, and the cells beyond."""
+        own = self.faces[cell]
+        speed = np.einsum("kfi,ki->kf", self.normals[own], way)
+        apart = np.einsum("kfi,kfi->kf", self.normals[own], self.middles[own] - place[:, None])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = np.where(speed > 0, np.maximum(apart, 0.0) / speed, np.inf)
+        exit_ = distance.argmin(axis=1)
+        rows = np.arange(len(cell))
+        return distance[rows, exit_], self.others[own[rows, exit_]]
+
+
+def _beyond(faces: IntArray, owners: IntArray) -> IntArray:
+    """For each face of a cell the cell on its other side, shape (k,); -1 for none."""
+    _, key = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    order = np.argsort(key.ravel(), kind="stable")
+    same = np.flatnonzero(np.diff(key.ravel()[order]) == 0)
+    others = np.full(len(faces), -1)
+    a, b = order[same], order[same + 1]
+    others[a], others[b] = owners[b], owners[a]
+    return others

@@ -52,7 +52,8 @@ class Block:
         vectors = {"state": self.state, "rate": self.rate, "acceleration": self.acceleration}
         if dynamic:
             vectors["end"] = self.end
-        self._vectors = [(name, x) for name, x in vectors.items() if x in present]
+        #: Arguments that the residual depends on, and the arrays of their coefficients.
+        self._vectors = [(name, x.x.array) for name, x in vectors.items() if x in present]
 
     def kinematics(self, state: fem.Function, rate: fem.Function | None) -> Deformation:
         """Kinematics of a state and its rate."""
@@ -121,8 +122,8 @@ class Block:
         """Hand the arguments to the coefficients of the forms."""
         self.coefficients.set_instant(at.now)
         dofs = self.domain.dofs
-        for name, function in self._vectors:
-            function.x.array[:] = getattr(at, name)[dofs]
+        for name, values in self._vectors:
+            values[:] = getattr(at, name)[dofs]
         if self.load is not None and self.load.value != at.load:
             self.load.value = at.load
 

@@ -94,6 +94,7 @@ class System:
         self._held_corners = [corners for _, corners in groups]
         self._held_dofs = 3 * points[:, None] + np.arange(3)
         self._held_places = [scene.body.points[part] for part in held]
+        self._moves = any(support.moves for support in scene.held)
         moved = [part.carried for part in self.couplings]
         stuck = numbering.cells_of_stuck_pressures(np.concatenate([points, *moved]))
         if stuck.size:
@@ -138,8 +139,10 @@ class System:
         for block in others:
             out += block.residual(at, self.size)
 
-    def _held_displacement(self, at: Arguments) -> FloatArray:
-        """Prescribed displacement of the held points at the end, shape (k, 3), m."""
+    def _held_displacement(self, at: Arguments) -> FloatArray | float:
+        """Prescribed displacement of the held points at the end, shape (k, 3), m; 0 if all rest."""
+        if not self._moves:
+            return 0.0
         supports = zip(self.scene.held, self._held_places, strict=True)
         nodes = np.concatenate([part.displacement(x, at.time_end) for part, x in supports])
         parts = [nodes[corners].mean(axis=1) for corners in self._held_corners[1:]]
