@@ -16,7 +16,6 @@ An obstacle that nothing comes near costs an interpolation of positions: see `Ob
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from itertools import pairwise
 
 import numpy as np
@@ -28,7 +27,7 @@ from dolfin_tongue.body.state import NOTHING
 from dolfin_tongue.boundary.contact import Contact, in_front
 from dolfin_tongue.control import Instant
 from dolfin_tongue.direct.membranes import base_vectors, determinant
-from dolfin_tongue.direct.parts import Configuration, Part, chosen
+from dolfin_tongue.direct.parts import Configuration, Part, Tangent
 from dolfin_tongue.march.observed import Touch
 from dolfin_tongue.surfaces.base import Gap
 
@@ -140,22 +139,16 @@ class Obstacle(Part):
         rate = None if relative is None else np.einsum("ji,ji->j", gap.normal, relative)
         return self.term.law.traction(gap.distance, rate)
 
-    def add_tangent(
-        self,
-        at: Configuration,
-        factor: float,
-        rate_factor: float,
-        out: list[FloatArray],
-        labels: Collection[str] | None = None,
-    ) -> None:
+    def add_tangent(self, at: Configuration, tangent: Tangent) -> None:
         """Add -(factor dF/dU + rate_factor dF/dV) to the element matrices of the blocks."""
-        near, gap = self._near(at.now, at.x) if chosen(self.labels[0], labels) else NOWHERE
+        near, gap = self._near(at.now, at.x) if tangent.counts(self.labels[0]) else NOWHERE
         if not near.size:
             return
         relative = self._relative(at.now.time, at.v, near)
         traction, by_gap, by_rate = self._law(gap, relative)
         n = gap.normal
-        row = (factor * by_gap + rate_factor * by_rate)[:, None] * n
+        factor = tangent.factor
+        row = (factor * by_gap + tangent.rate_factor * by_rate)[:, None] * n
         if relative is not None:
             turned = np.einsum("jab,jb->ja", gap.curvature, relative)
             row += factor * np.asarray(by_rate)[:, None] * turned
@@ -167,7 +160,7 @@ class Obstacle(Part):
         for group, part in zip(self.groups, self.slices, strict=True):
             add_matrices(
                 matrices[part], touched[part], group.kind.shapes, group.cells, group.local,
-                out[group.block],
+                tangent.matrices[group.block],
             )  # fmt: skip
 
     def energy(self, now: Instant, x: FloatArray) -> float:

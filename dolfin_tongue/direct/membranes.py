@@ -21,7 +21,6 @@ force is *minus* that, where (47) is printed with a plus. With B = dE/dU the tan
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection
 
 import numpy as np
 
@@ -33,7 +32,7 @@ from dolfin_tongue.body.face_groups import FaceGroup
 from dolfin_tongue.body.regions import on_cells
 from dolfin_tongue.boundary.skin import Skin
 from dolfin_tongue.boundary.surface_tension import SurfaceTension
-from dolfin_tongue.direct.parts import Configuration, Part, chosen
+from dolfin_tongue.direct.parts import Configuration, Part, Tangent
 
 
 class Membrane(Part):
@@ -90,23 +89,17 @@ class Membrane(Part):
         stress, _, _ = self._stress(metric)
         add_forces(stress, base, self.group.faces, kind.gradients, kind.weights, out)
 
-    def add_tangent(
-        self,
-        at: Configuration,
-        factor: float,
-        rate_factor: float,
-        out: list[FloatArray],
-        labels: Collection[str] | None = None,
-    ) -> None:
+    def add_tangent(self, at: Configuration, tangent: Tangent) -> None:
         """Add factor times minus the force's derivative to the elements' matrices, N/m."""
-        if not factor or not chosen(self.labels[0], labels):
+        if not tangent.factor or not tangent.counts(self.labels[0]):
             return
         group, kind = self.group, self.group.kind
         base, metric = self._metric(at.x)
         stress, beta, gamma = self._stress(metric)
         add_matrices(
             stress, (beta, gamma), base, conjugate(metric),
-            (kind.gradients, factor * kind.weights), (group.cells, group.local), out[group.block],
+            (kind.gradients, tangent.factor * kind.weights), (group.cells, group.local),
+            tangent.matrices[group.block],
         )  # fmt: skip
 
     def energies(self, at: Configuration) -> dict[str, float]:

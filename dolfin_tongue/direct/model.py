@@ -24,7 +24,7 @@ from dolfin_tongue.direct.constraints import Constraints
 from dolfin_tongue.direct.contacts import Obstacle
 from dolfin_tongue.direct.mass import element_masses, mass_matrix
 from dolfin_tongue.direct.numbering import Numbering
-from dolfin_tongue.direct.parts import Configuration
+from dolfin_tongue.direct.parts import Configuration, Tangent
 from dolfin_tongue.scene.scene import Scene
 from dolfin_tongue.scene.well_posed import check_pressures
 
@@ -109,8 +109,9 @@ class Model:
         """
         shapes = [(len(d), d.shape[1], d.shape[1]) for d in self.numbering.part_dofs]
         result: list[FloatArray] = [np.zeros(shape) for shape in shapes]
+        tangent = Tangent(factor, rate_factor, result, labels)
         for part in self.parts:
-            part.add_tangent(at, factor, rate_factor, result, labels)
+            part.add_tangent(at, tangent)
         return result
 
     def reduced(

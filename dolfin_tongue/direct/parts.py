@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -56,6 +57,27 @@ class Configuration:
         return result
 
 
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Element matrices, to which parts add -(factor dF/dU + rate_factor dF/dV).
+
+    Parameters
+    ----------
+    factor, rate_factor : weights.
+    matrices : per block of shape (m, 3k, 3k); dofs by component, then node.
+    labels : of the terms that count; None: all.
+    """
+
+    factor: float
+    rate_factor: float
+    matrices: list[FloatArray]
+    labels: Collection[str] | None = None
+
+    def counts(self, label: str) -> bool:
+        """Whether a term counts."""
+        return self.labels is None or label in self.labels
+
+
 class Part(ABC):
     """Forces on the nodes from one term, or from several.
 
@@ -73,23 +95,8 @@ class Part(ABC):
         """Add the nodal forces to out, shape (n, 3), N."""
 
     @abstractmethod
-    def add_tangent(
-        self,
-        at: Configuration,
-        factor: float,
-        rate_factor: float,
-        out: list[FloatArray],
-        labels: Collection[str] | None = None,
-    ) -> None:
-        """Add -(factor dF/dU + rate_factor dF/dV) to the element matrices of the blocks.
-
-        Parameters
-        ----------
-        at : where.
-        factor, rate_factor : weights.
-        out : per block of shape (m, 3k, 3k); dofs by component, then node.
-        labels : of the terms that count; None: all.
-        """
+    def add_tangent(self, at: Configuration, tangent: Tangent) -> None:
+        """Add -(factor dF/dU + rate_factor dF/dV) to element matrices."""
 
     def energies(self, at: Configuration) -> dict[str, float]:
         """Energies of its terms that have one, J."""
@@ -116,21 +123,9 @@ class Load(Part):
         """Add the force."""
         out += self.force
 
-    def add_tangent(
-        self,
-        at: Configuration,
-        factor: float,
-        rate_factor: float,
-        out: list[FloatArray],
-        labels: Collection[str] | None = None,
-    ) -> None:
+    def add_tangent(self, at: Configuration, tangent: Tangent) -> None:
         """Add nothing."""
 
     def energies(self, at: Configuration) -> dict[str, float]:
         """Minus force times displacement, J."""
         return {self.labels[0]: -float(np.sum(self.force * at.u[: len(self.force)]))}
-
-
-def chosen(label: str, labels: Collection[str] | None) -> bool:
-    """Whether a term counts."""
-    return labels is None or label in labels

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.body.body import Body
 from dolfin_tongue.control import Instant
 from dolfin_tongue.direct import points
-from dolfin_tongue.direct.parts import Configuration, Part, chosen
+from dolfin_tongue.direct.parts import Configuration, Part, Tangent
 
 #: No fibres, and no level: shapes (1, 1, 3) and (1, 0).
 NO_FIBRES, NO_LEVEL = np.zeros((1, 1, 3)), np.zeros((1, 0))
@@ -86,24 +86,19 @@ class Tissue(Part):
                 law.stress(F, rate, law.numbers, law.fibres, level, stress)
             points.add_nodal_forces(stress, block.cells, block.gradients, block.weights, out)
 
-    def add_tangent(
-        self,
-        at: Configuration,
-        factor: float,
-        rate_factor: float,
-        out: list[FloatArray],
-        labels: Collection[str] | None = None,
-    ) -> None:
+    def add_tangent(self, at: Configuration, tangent: Tangent) -> None:
         """Add int grad N : (factor dP/dF + rate_factor dP/d(rate)) : grad N."""
         for number, block in enumerate(self.body.blocks):
             F, rate = at.strains[number]
+            factors = (tangent.factor, tangent.rate_factor)
             moduli = np.zeros((*block.shape, 9, 9))
             for label, parts in self.laws:
-                if chosen(label, labels):
+                if tangent.counts(label):
                     law = parts[number]
                     given = (law.numbers, law.fibres, law.level(at.now.of(label)))
-                    law.moduli(F, rate, *given, (factor, rate_factor), moduli)
-            points.add_element_matrices(moduli, block.gradients, block.weights, out[number])
+                    law.moduli(F, rate, *given, factors, moduli)
+            out = tangent.matrices[number]
+            points.add_element_matrices(moduli, block.gradients, block.weights, out)
 
     def stresses(self, at: Configuration) -> dict[str, FloatArray]:
         """First Piola-Kirchhoff stress of each term at all points, shape (Q, 3, 3), Pa."""
