@@ -18,7 +18,8 @@ from dolfin_tongue.boundary import SurfaceTension
 from dolfin_tongue.constitutive import Viscosity
 from dolfin_tongue.direct import Model, TrBdf2, drift
 from dolfin_tongue.geometry.simple import block_body
-from dolfin_tongue.record.run import Method, Run
+from dolfin_tongue.march.solver import Method
+from dolfin_tongue.record.run import Run
 from dolfin_tongue.scene.scene import Scene
 
 EDGE = 0.02  # m

@@ -18,7 +18,8 @@ from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import NotConverged, TongueError
 from dolfin_tongue.body.shape import volume_changes
 from dolfin_tongue.body.state import State
-from dolfin_tongue.record.run import Method, simulate
+from dolfin_tongue.march.solver import Method
+from dolfin_tongue.record.run import simulate
 from dolfin_tongue.scene.scene import Scene
 
 #: Largest relative volume change of a cell of which we say that the volumes are kept.

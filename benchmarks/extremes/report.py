@@ -14,7 +14,7 @@ from dolfin_tongue.base.files import write_json, write_text
 from dolfin_tongue.body.state import State
 from dolfin_tongue.direct import TrBdf2
 from dolfin_tongue.fenicsx import GeneralisedAlpha
-from dolfin_tongue.record.run import Method
+from dolfin_tongue.march.solver import Method
 from dolfin_tongue.scene.scene import Scene
 
 FENICSX, DIRECT = "FEniCSx", "direct"

@@ -15,7 +15,7 @@ from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.body.state import State
 from dolfin_tongue.direct import Adaptive, RungeKutta4, TrBdf2
 from dolfin_tongue.fenicsx import GeneralisedAlpha
-from dolfin_tongue.record.run import Method
+from dolfin_tongue.march.solver import Method
 from dolfin_tongue.scene.scene import Scene
 
 #: Methods of the map: label, and the method for a step (s).

@@ -15,7 +15,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from dolfin_tongue.app.pictures import picture_run
 from dolfin_tongue.base.errors import TongueError, UnknownName, require_positive
 from dolfin_tongue.direct import TrBdf2
-from dolfin_tongue.record.run import Method, Run, simulate
+from dolfin_tongue.march.solver import Method
+from dolfin_tongue.record.run import Run, simulate
 from dolfin_tongue.scene.scene import Scene
 
 #: Demos and benchmarks stand beside the package in a checkout, each a file with a `main`.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import resource
 import time as clock
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -14,13 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import BadScene
 from dolfin_tongue.body.state import State
-
-
-class Solver(Protocol):
-    """What both solvers have in common."""
-
-    def march(self, end: float, start: State | None = None) -> Iterator[State]:
-        """March to an end time; yields every accepted state."""
+from dolfin_tongue.march.solver import Solver
 
 
 def at_times(states: Iterable[State], times: Sequence[float]) -> list[State]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -110,6 +110,13 @@ class Observer(ABC):
     @abstractmethod
     def muscles(self, state: State) -> dict[str, MuscleState]:
         """Activation, stretch, stress and force of each muscle that takes part."""
+
+
+class Method(Protocol):
+    """Numbers of a time-stepping method: `GeneralisedAlpha`, `TrBdf2`, `Adaptive`, ..."""
+
+    def solver(self, scene: Any) -> Solver:
+        """Return the solver of a scene."""
 
 
 class Solver(Observer):

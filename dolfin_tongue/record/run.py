@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from dolfin_tongue.base.arrays import FloatArray
 from dolfin_tongue.base.errors import BadScene, OutOfRange, is_number
 from dolfin_tongue.body.state import State
-from dolfin_tongue.march.solver import Solver
+from dolfin_tongue.march.solver import Method, Solver
 from dolfin_tongue.record.description import (
     add_session,
     read_description,
@@ -27,13 +27,6 @@ from dolfin_tongue.record.recorder import DAMAGED, Recorder
 from dolfin_tongue.record.state_file import state_from
 from dolfin_tongue.record.watch import Watch
 from dolfin_tongue.scene.scene import Scene
-
-
-class Method(Protocol):
-    """Numbers of a time-stepping method: `GeneralisedAlpha`, `TrBdf2`, `Adaptive`, ..."""
-
-    def solver(self, scene: Scene) -> Solver:
-        """Return the solver of a scene."""
 
 
 @dataclass
@@ -138,12 +131,13 @@ def _method(method: Method | None, pair: str | None) -> Method:
         method = GeneralisedAlpha()
     if pair is None:
         return method
-    if not hasattr(method, "pair"):
+    with_pair = getattr(method, "with_pair", None)
+    if with_pair is None:
         raise BadScene(
             f"{type(method).__name__} has one pair of spaces, that of the report; leave out "
             f"pair={pair!r} or take GeneralisedAlpha"
         )
-    return replace(method, pair=pair)  # type: ignore[type-var]
+    return with_pair(pair)
 
 
 def _start(solver: Solver, start: State | FloatArray | None) -> State:
