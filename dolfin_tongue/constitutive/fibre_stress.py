@@ -82,10 +82,16 @@ class FibreStress(StressTerm):
 
     def activations(self, now: Instant) -> FloatArray:
         """Activation vector at an instant, shape (len(names),)."""
-        values = {name: control.at(now.of(name)) for name, control in self.activation.items()}
-        for name, value in values.items():
-            require_activation(value, f"activation of {name!r} at t = {now.time:g} s")
-        return np.array(list(values.values()), dtype=float)
+        values = [control.at(now.of(name)) for name, control in self.activation.items()]
+        try:
+            levels = np.array(values, dtype=float)
+            fine = levels.ndim == 1 and levels.min() >= 0.0 and levels.max() <= 1.0
+        except (TypeError, ValueError):
+            fine = False
+        if not fine:  # the check of each costs more than all the rest
+            for name, value in zip(self.activation, values, strict=True):
+                require_activation(value, f"activation of {name!r} at t = {now.time:g} s")
+        return levels
 
     def slots(self, body: Body) -> Slots:
         """Slots of the muscles that take part."""

@@ -174,8 +174,11 @@ class Constraints:
     def evaluate(self, displacement: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
         """Constraints A, shape (c,), m3, and their gradients: volume changes (53), then slides."""
         x = self.positions(displacement)
+        if len(self.parts) == 1:
+            value, gradient = self.parts[0].evaluate(x)
+            return value, [gradient]
         values, gradients = zip(*(part.evaluate(x) for part in self.parts), strict=True)
-        return (values[0] if len(values) == 1 else np.concatenate(values)), list(gradients)
+        return np.concatenate(values), list(gradients)
 
     def rate(self, gradients: list[FloatArray], velocity: FloatArray) -> FloatArray:
         """dA/dU . v of all constraints, shape (c,), m3/s."""

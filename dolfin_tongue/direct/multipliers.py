@@ -122,7 +122,7 @@ class Acceleration:
         force = model.numbering.padded(model.force(now, displacement, velocity))
         acceleration = model.held_acceleration(now.time, displacement, velocity)
         if self._held:
-            force -= model.whole_mass @ acceleration
+            force -= model.inertia(acceleration)
         change, gradients = model.constraints.evaluate(displacement)
         force = model.reduced(now, displacement, velocity, acceleration, force)
         self.add(self.solve(force), acceleration)

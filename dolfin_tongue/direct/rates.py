@@ -112,9 +112,16 @@ def _add_viscous(
 
 
 @compiled
-def _tension(stretch: float, rate: float, law: FloatArray) -> tuple[float, float, float]:
-    """Tension f(stretch) g(rate) (73) and its two derivatives; law = (a, b, s, c, a_r, b_r, ..)."""
-    a, b, s, c, a_r, b_r = law[0], law[1], law[2], law[3], law[4], law[5]
+def _tension(
+    stretch: float, rate: float, numbers: Array, at: tuple[int, int, int]
+) -> tuple[float, float, float]:
+    """Tension f(stretch) g(rate) (73) and its two derivatives, in shares of the largest stress.
+
+    The numbers (a, b, s, c, a_r, b_r, ..) are read one by one: a view of them would cost more.
+    """
+    i, j, k = at
+    a, b, s, c = numbers[i, j, k, 0], numbers[i, j, k, 1], numbers[i, j, k, 2], numbers[i, j, k, 3]
+    a_r, b_r = numbers[i, j, k, 4], numbers[i, j, k, 5]
     x = a * (stretch - 1.0 + s)
     # (74) times exp(b x) above and below: both exponents fall for a short fibre.
     up = exp(b * x)
@@ -139,14 +146,14 @@ def active_stress(
         for point in range(F.shape[1]):
             f, v = F[cell, point], rate[cell, point]
             jacobian = inverse_transpose(f, B)
-            own = numbers[cell if cells else 0, point if points else 0]
             for slot in range(level.shape[1]):
                 if level[cell, slot] == 0.0:
                     continue
-                N, law = fibres[cell, slot], own[slot if slots else 0]
+                at = (cell if cells else 0, point if points else 0, slot if slots else 0)
+                N = fibres[cell, slot]
                 stretch, speed = _fibre(f, v, N, n, w)
-                strength = jacobian * law[6] * level[cell, slot]
-                tension = strength * _tension(stretch, speed, law)[0]
+                strength = jacobian * numbers[at[0], at[1], at[2], 6] * level[cell, slot]
+                tension = strength * _tension(stretch, speed, numbers, at)[0]
                 for i in range(3):
                     for j in range(3):
                         part = n[i] * N[j] / (stretch * stretch) - B[i, j] / 3.0
@@ -182,14 +189,14 @@ def active_moduli(
         for point in range(F.shape[1]):
             f, v = F[cell, point], rate[cell, point]
             jacobian = inverse_transpose(f, B)
-            own = numbers[cell if cells else 0, point if points else 0]
             for slot in range(level.shape[1]):
                 if level[cell, slot] == 0.0:
                     continue
-                N, law = fibres[cell, slot], own[slot if slots else 0]
+                at = (cell if cells else 0, point if points else 0, slot if slots else 0)
+                N = fibres[cell, slot]
                 stretch, speed = _fibre(f, v, N, n, w)
-                value, by_stretch, by_rate = _tension(stretch, speed, law)
-                scale = jacobian * law[6] * level[cell, slot]
+                value, by_stretch, by_rate = _tension(stretch, speed, numbers, at)
+                scale = jacobian * numbers[at[0], at[1], at[2], 6] * level[cell, slot]
                 for k in range(3):
                     turn = w[k] / stretch - speed * n[k] / stretch**2
                     along[k] = (factor * by_stretch + rate_factor * by_rate) * n[k] / stretch

@@ -159,7 +159,7 @@ class StageSolver:
         model = self.model
         force = model.numbering.padded(model.force(stage.read, point.u, point.v))
         model.constraints.add_force(gradients, point.pressure, force)
-        force -= model.whole_mass @ point.a
+        force -= model.inertia(point.a)
         return force
 
     def _renew(self, point: Point, stage: Stage) -> None:
