@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
 
-from dolfin_tongue.app.demo import Options, available, load
+from dolfin_tongue.app.demo import CHECKOUT, Options, available, load
 
 #: Step of each demo here, s (larger than its own), and files that its pictures make.
 STEPS = {
@@ -64,3 +65,15 @@ def test_a_demo_by_fenicsx(tmp_path):
     assert rows["tip moved, mm"].split()[0] == "back"
     mine, theirs = (float(x["tip moved, mm"].split()[1].rstrip(",")) for x in (direct, rows))
     assert mine == pytest.approx(theirs, abs=0.2)
+
+
+def test_the_example_of_the_readme(tmp_path, monkeypatch, capsys):
+    """As it is printed: one import line, a run, and what it left read back."""
+    pytest.importorskip("dolfinx")
+    text = (CHECKOUT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "README.md", "exec", dont_inherit=True), {"__name__": "readme"})
+    first, second = capsys.readouterr().out.strip().splitlines()[-2:]
+    assert float(first.split()[-1]) < 1e-8  # largest volume change
+    assert second.startswith("(96, 3, 3)") and float(second.split()[-1]) > 1.0  # N
