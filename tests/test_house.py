@@ -50,6 +50,12 @@ def test_modules_functions_and_signatures_fit_on_a_screen():
     assert {f.name for f in functions if f.parameters > PARAMETERS} == set(MANY)
 
 
+def test_the_benchmark_prints_the_house(tmp_path, capsys):
+    table = load("house", "benchmark")(Options(tmp_path))
+    assert table["circles of rooms"] == table["circles of files"] == 0
+    assert "floor  7: direct" in capsys.readouterr().out
+
+
 def test_circles_are_found():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set()}
     assert circles(graph) == [("a", "b", "c")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -93,6 +94,7 @@ def load(name: str, kind: str = "demo") -> Callable[[Options], dict[str, Any]]:
     if spec is None or spec.loader is None:
         raise TongueError(f"the {kind} {name} cannot be loaded from {path}")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where dataclasses look for the names of their fields
     spec.loader.exec_module(module)
     return module.main
 
