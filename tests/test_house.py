@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from benchmarks.house import BODY, CHECKOUT, LINES, PARAMETERS, House, circles
+from dolfin_tongue.app.demo import Options, load
 
 HOUSE = House()
 
